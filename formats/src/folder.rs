@@ -1,0 +1,70 @@
+//! Where things lie in a run folder. Every stage asks here; no path is spelled twice.
+
+use std::path::{Path, PathBuf};
+
+/// A run folder: `sph-prep` makes it, `sph-run` works in it, `sph-post` reads it and adds `post/`.
+#[derive(Clone, Debug)]
+pub struct RunFolder(PathBuf);
+
+impl RunFolder {
+    /// The folder at `path`, which need not exist.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        Self(path.into())
+    }
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+    /// The scene as it was prepared, byte for byte.
+    pub fn scene(&self) -> PathBuf {
+        self.0.join("scene.lock.toml")
+    }
+    /// Who made what, with which versions.
+    pub fn provenance(&self) -> PathBuf {
+        self.0.join("provenance.json")
+    }
+    /// The particles `sph-prep` made.
+    pub fn initial(&self) -> PathBuf {
+        self.0.join("initial.hdf")
+    }
+    /// Snapshots and history.
+    pub fn out(&self) -> PathBuf {
+        self.0.join("out")
+    }
+    /// Snapshot number `index`, counted from 0.
+    pub fn snapshot(&self, index: u64) -> PathBuf {
+        self.out().join(format!("snapshot-{index:06}.hdf"))
+    }
+    /// The times of the snapshots, for ParaView: a `.hdf.series` file.
+    pub fn series(&self) -> PathBuf {
+        self.out().join("snapshot.hdf.series")
+    }
+    /// Energies, front and height over time: CSV, the same bits on any number of ranks.
+    pub fn history(&self) -> PathBuf {
+        self.out().join("history.csv")
+    }
+    /// Logs that depend on the machine: rates, imbalance.
+    pub fn log(&self) -> PathBuf {
+        self.0.join("log")
+    }
+    /// Checkpoint generations.
+    pub fn checkpoints(&self) -> PathBuf {
+        self.0.join("ckpt")
+    }
+    /// What `sph-post` writes.
+    pub fn post(&self) -> PathBuf {
+        self.0.join("post")
+    }
+    /// Present once the run reached its end.
+    pub fn done(&self) -> PathBuf {
+        self.0.join("DONE")
+    }
+    /// A user's request to stop at the next step.
+    pub fn stop(&self) -> PathBuf {
+        self.0.join("STOP")
+    }
+    /// Present while a process works in the folder.
+    pub fn lock(&self) -> PathBuf {
+        self.0.join("LOCK")
+    }
+}

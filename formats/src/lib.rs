@@ -1,0 +1,16 @@
+//! What is on disk, and the vocabulary to read it.
+//!
+//! The stages `sph-prep`, `sph-run` and `sph-post` never depend on each other: they meet in the files this crate
+//! reads and writes. It knows no time stepping and no neighbours, and no MPI outside [`h5`].
+
+pub mod exit;
+pub mod folder;
+pub mod h5;
+pub mod kernel;
+pub mod provenance;
+pub mod results;
+pub mod scene;
+pub mod schema;
+pub mod snapshot;
+pub mod space;
+pub mod units;

@@ -1,0 +1,261 @@
+//! A checked scene: everything in SI units, every value within its range, every default filled in.
+//!
+//! [`Scene::read`] goes from text to a checked scene, or to the list of all its faults, each with line and column.
+
+mod check;
+mod error;
+mod raw;
+
+mod walls;
+
+pub use error::{Fault, SceneError};
+pub use walls::{Site, WallLattice};
+
+use crate::{kernel::Kernel, space::Space};
+
+/// A checked scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// One line for titles of pictures and files.
+    pub title: String,
+    /// The space it is solved in.
+    pub space: Space,
+    /// Lattice spacing dx, m.
+    pub spacing: f64,
+    /// Acceleration of gravity, m/s2; y must be zero in the plane spaces, x and y in the axisymmetric one.
+    pub gravity: [f64; 3],
+    /// Is the plane x = 0, y = 0 a plane of symmetry? The material lies on the positive side.
+    /// The axis of the axisymmetric space is implied: `[false; 2]` there.
+    pub symmetry: [bool; 2],
+    /// Smoothing kernel.
+    pub kernel: Kernel,
+    /// Smoothing length over spacing, h/dx.
+    pub h_over_dx: f64,
+    /// What the bodies are made of.
+    pub material: Material,
+    /// At least one, none overlapping.
+    pub bodies: Vec<Body>,
+    /// Planes that hold the material.
+    pub walls: Vec<Wall>,
+    /// Stress and disorder at the start.
+    pub initial: Initial,
+    /// Numerical parameters.
+    pub numerics: Numerics,
+    /// When the run is over.
+    pub end: End,
+    /// What is written while it runs.
+    pub output: Output,
+}
+
+/// Constitutive law.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Material {
+    /// Elastic, perfectly plastic with the Drucker-Prager criterion.
+    DruckerPrager(DruckerPrager),
+}
+
+/// Parameters of the Drucker-Prager law.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DruckerPrager {
+    /// Density at the start, kg/m3.
+    pub density: f64,
+    /// Young's modulus E, Pa.
+    pub young: f64,
+    /// Poisson's ratio, in [0, 0.5).
+    pub poisson: f64,
+    /// Friction angle, degrees, in [0, 90).
+    pub friction_deg: f64,
+    /// Dilation angle, degrees, in [0, friction].
+    pub dilation_deg: f64,
+    /// Cohesion, Pa.
+    pub cohesion: f64,
+    /// Which cone replaces the Mohr-Coulomb pyramid.
+    pub cone: Cone,
+    /// How the stress turns with the material.
+    pub rotation: Rotation,
+}
+
+/// Cones through different edges of the Mohr-Coulomb pyramid; the same angle means different strengths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cone {
+    /// `compression`: through the triaxial-compression corners (Yang et al. 2020, Eqs 12, 13).
+    Compression,
+    /// `extension`: through the triaxial-extension corners.
+    Extension,
+    /// `plane-strain`: exact in plane strain with associated flow (Bui et al. 2008).
+    PlaneStrain,
+    /// `plane-strain-isochoric`: exact in plane strain without dilation, alpha = sin(phi)/3.
+    PlaneStrainIsochoric,
+}
+
+/// Integration of the rotation of stress.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rotation {
+    /// `jaumann`: forward Euler of the Jaumann rate (Yang et al. 2020, Eq 15).
+    Jaumann,
+    /// `hughes-winget`: incremental rotation that keeps the norm (Hughes & Winget 1980).
+    HughesWinget,
+}
+
+/// A piece of material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// For messages.
+    pub name: String,
+    /// Where it is.
+    pub shape: Shape,
+    /// Velocity at the start, m/s.
+    pub velocity: [f64; 3],
+}
+
+/// Shapes of bodies, m.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Upright cylinder: `base` is the centre of its foot. In the axisymmetric space `base` lies on the axis.
+    /// Not in plane strain.
+    Cylinder {
+        /// Centre of the foot.
+        base: [f64; 3],
+        /// Radius.
+        radius: f64,
+        /// Height.
+        height: f64,
+    },
+    /// Box between two corners; in the plane spaces the y extent is ignored and zero.
+    Box {
+        /// Lower corner.
+        min: [f64; 3],
+        /// Upper corner.
+        max: [f64; 3],
+    },
+    /// Prism along y whose x-z section is a right-angled triangle: vertical face of `size[2]` at `corner`,
+    /// falling to nothing at `corner.x + size[0]` (or to the left where `falls_left`). Plane strain and 3-D.
+    Wedge {
+        /// Foot of the vertical face, lowest y.
+        corner: [f64; 3],
+        /// Length along x, width along y (ignored in the plane space), height along z.
+        size: [f64; 3],
+        /// Does the slope fall towards smaller x?
+        falls_left: bool,
+    },
+}
+
+/// A plane wall normal to an axis, infinite in its plane; represented by virtual particles behind it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wall {
+    /// The axis it is normal to: 0 x, 1 y, 2 z.
+    pub axis: usize,
+    /// Its place on that axis, m. A whole number of spacings from 0 where a symmetry plane lies on the same axis,
+    /// and from the other wall where there are two.
+    pub at: f64,
+    /// +1: the material lies at larger coordinates (a floor); -1: at smaller ones.
+    pub side: f64,
+    /// What it does to sliding.
+    pub slip: Slip,
+}
+
+/// Condition at a wall.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slip {
+    /// `no-slip`: the material sticks.
+    NoSlip,
+    /// `free-slip`: no shear stress.
+    FreeSlip,
+}
+
+/// State at the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Initial {
+    /// Stress.
+    pub stress: InitialStress,
+    /// Largest random displacement over spacing, in [0, 0.5).
+    pub jitter: f64,
+    /// Of the random displacement.
+    pub seed: u64,
+}
+
+/// Stress at the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InitialStress {
+    /// `zero`: none.
+    Zero,
+    /// `hydrostatic`: the weight above in all directions.
+    Hydrostatic,
+    /// `k0`: the weight above vertically, `coefficient` times that sideways.
+    K0 {
+        /// Horizontal over vertical stress; nu/(1-nu) where the scene names none.
+        coefficient: f64,
+    },
+}
+
+/// Numerical parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Numerics {
+    /// Safety factor of the time step: dt = courant h/(c + |v|).
+    pub courant: f64,
+    /// Artificial viscosity alpha.
+    pub viscosity: f64,
+    /// Linear damping of the velocity, 1/s: for columns that settle, not for flows.
+    pub damping: f64,
+}
+
+/// When the run is over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct End {
+    /// At this time, s.
+    pub time: f64,
+    /// Earlier, once the kinetic energy falls below this fraction of its peak.
+    pub at_rest: Option<f64>,
+}
+
+/// What is written while the run goes on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Output {
+    /// Time between snapshots, s.
+    pub snapshots: f64,
+    /// Time between lines of the history, s.
+    pub history: f64,
+}
+
+impl Scene {
+    /// Checks the text of a scene file; `name` is used in messages. All faults are reported at once.
+    pub fn read(name: &str, text: &str) -> Result<Self, SceneError> {
+        check::scene(name, text)
+    }
+
+    /// Smoothing length h, m.
+    pub fn h(&self) -> f64 {
+        self.h_over_dx * self.spacing
+    }
+
+    /// SHA-256 of the text, as stored in every file the scene leads to.
+    pub fn hash(text: &str) -> String {
+        crate::provenance::sha256(text.as_bytes())
+    }
+}
+
+impl Material {
+    /// Density at the start, kg/m3.
+    pub fn density(&self) -> f64 {
+        match self {
+            Self::DruckerPrager(law) => law.density,
+        }
+    }
+    /// Speed of compression waves, m/s (Yang et al. 2020, Eq 41).
+    pub fn sound_speed(&self) -> f64 {
+        match self {
+            Self::DruckerPrager(law) => ((law.bulk() + 4.0 / 3.0 * law.shear()) / law.density).sqrt(),
+        }
+    }
+}
+
+impl DruckerPrager {
+    /// Bulk modulus K, Pa.
+    pub fn bulk(&self) -> f64 {
+        self.young / (3.0 * (1.0 - 2.0 * self.poisson))
+    }
+    /// Shear modulus G, Pa.
+    pub fn shear(&self) -> f64 {
+        self.young / (2.0 * (1.0 + self.poisson))
+    }
+}
