@@ -51,6 +51,10 @@ impl RunFolder {
     pub fn checkpoints(&self) -> PathBuf {
         self.0.join("ckpt")
     }
+    /// Checkpoint generation number `generation`.
+    pub fn generation(&self, generation: u64) -> PathBuf {
+        self.checkpoints().join(format!("gen-{generation:06}"))
+    }
     /// What `sph-post` writes.
     pub fn post(&self) -> PathBuf {
         self.0.join("post")

@@ -36,6 +36,7 @@ impl Kernel {
     }
 
     /// W(q) without normalisation.
+    #[inline]
     pub fn shape(self, q: f64) -> f64 {
         match self {
             Self::CubicSpline if q < 1.0 => 2.0 / 3.0 - q * q + 0.5 * q * q * q,
@@ -46,6 +47,7 @@ impl Kernel {
     }
 
     /// W'(q)/q without normalisation, finite at q = 0.
+    #[inline]
     pub fn slope_over_q(self, q: f64) -> f64 {
         match self {
             Self::CubicSpline if q < 1.0 => 1.5 * q - 2.0,
@@ -56,12 +58,13 @@ impl Kernel {
     }
 
     /// The factor that makes the integral of `shape(r/h) norm / h^dimension` one.
+    #[inline]
     pub fn norm(self, dimension: usize) -> f64 {
         match (self, dimension) {
             (Self::CubicSpline, 1) => 1.0,
             (Self::CubicSpline, 2) => 15.0 / (7.0 * PI),
             (Self::CubicSpline, 3) => 3.0 / (2.0 * PI),
-            (Self::WendlandC2, 1) => 0.625,
+            (Self::WendlandC2, 1) => 0.75,
             (Self::WendlandC2, 2) => 7.0 / (4.0 * PI),
             (Self::WendlandC2, 3) => 21.0 / (16.0 * PI),
             _ => panic!("a kernel has 1, 2 or 3 dimensions, not {dimension}"),

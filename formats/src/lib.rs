@@ -3,10 +3,13 @@
 //! The stages `sph-prep`, `sph-run` and `sph-post` never depend on each other: they meet in the files this crate
 //! reads and writes. It knows no time stepping and no neighbours, and no MPI outside [`h5`].
 
+pub mod checkpoint;
+pub mod disk;
 pub mod exit;
 pub mod folder;
 pub mod h5;
 pub mod kernel;
+pub mod lock;
 pub mod provenance;
 pub mod results;
 pub mod scene;

@@ -1,3 +1,27 @@
 //! Granular flow by smoothed particle hydrodynamics, distributed over MPI ranks.
+//!
+//! A step reads as in [`step`]: kick, drift, refill what surrounds the particles, stress, acceleration, kick.
+//! Types are chosen once in [`dispatch`]; the only loops over pairs are in [`sweep`].
+
 pub mod algebra;
+pub mod boundary;
+pub mod cli;
+pub mod dispatch;
+pub mod error;
+pub mod exact;
+pub mod limits;
+pub mod material;
+pub mod neighbors;
+pub mod output;
+pub mod parallel;
+pub mod particles;
+pub mod physics;
+pub mod progress;
+pub mod report;
+pub mod resume;
+pub mod run;
+pub mod simulation;
 pub mod space;
+pub mod step;
+pub mod sweep;
+pub mod timestep;

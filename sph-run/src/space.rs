@@ -16,6 +16,9 @@ pub trait Space<const D: usize, const N: usize>: Copy + Debug + Default + Send +
     /// Weight w of a place in volume integrals: dV = w dA up to a constant.
     fn metric(x: Vector<D>) -> f64;
 
+    /// The metric with which mass was turned into volume: w, kept away from zero near the axis.
+    fn mass_metric(x: Vector<D>, spacing: f64) -> f64;
+
     /// V = mass/(density w'), where w' is w times the constant (2 pi r in the axisymmetric space).
     fn volume(mass: f64, density: f64, x: Vector<D>, spacing: f64) -> f64;
 
@@ -114,6 +117,9 @@ impl Space<2, 4> for PlaneStrain {
     fn metric(_: Vector<2>) -> f64 {
         1.0
     }
+    fn mass_metric(_: Vector<2>, _: f64) -> f64 {
+        1.0
+    }
     fn volume(mass: f64, density: f64, _: Vector<2>, _: f64) -> f64 {
         mass / density
     }
@@ -137,6 +143,9 @@ impl Space<2, 4> for Axisymmetric {
     fn metric(x: Vector<2>) -> f64 {
         x.0[0]
     }
+    fn mass_metric(x: Vector<2>, spacing: f64) -> f64 {
+        radius(x, spacing)
+    }
     fn volume(mass: f64, density: f64, x: Vector<2>, spacing: f64) -> f64 {
         mass / (TAU * radius(x, spacing) * density)
     }
@@ -152,6 +161,9 @@ impl Space<2, 4> for Axisymmetric {
 impl Space<3, 6> for ThreeD {
     const KIND: Kind = Kind::ThreeD;
     fn metric(_: Vector<3>) -> f64 {
+        1.0
+    }
+    fn mass_metric(_: Vector<3>, _: f64) -> f64 {
         1.0
     }
     fn volume(mass: f64, density: f64, _: Vector<3>, _: f64) -> f64 {

@@ -1,1 +1,127 @@
-fn main() {}
+//! Starts the stages of a run in order. `./talus` at the root of the repository hands its words to this program.
+
+mod cases;
+mod failure;
+mod gate;
+mod launch;
+mod paths;
+mod stage;
+mod validate;
+
+use clap::{Parser, Subcommand};
+use failure::Failure;
+use std::path::PathBuf;
+
+/// Granular flows by SPH: from a scene to results.
+#[derive(Debug, Parser)]
+#[command(name = "talus", version, disable_help_subcommand = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run a small column collapse from start to end, into runs/demo.
+    Demo {
+        #[command(flatten)]
+        how: How,
+    },
+    /// Run one case, or a scene file of your own.
+    Case {
+        /// Name of a case (see `cases`), or path of a scene file that ends in .toml.
+        name: String,
+        /// Run folder; runs/NAME where it is left out.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        how: How,
+    },
+    /// List the cases.
+    Cases,
+    /// Run the validation cases and hold them against published numbers; writes tests/validation/RESULTS.md.
+    Validate {
+        /// Folders under tests/validation; all where none is named.
+        names: Vec<String>,
+        /// MPI ranks; the machine's cores where it is left out.
+        #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+        ranks: Option<u32>,
+        /// Use finished runs of the same scene in runs/validation again.
+        #[arg(long)]
+        reuse: bool,
+    },
+    /// Run every test of the repository.
+    Test {
+        /// Handed on to the test runner.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<String>,
+    },
+    /// Print this help.
+    Help,
+}
+
+/// How a run is started.
+#[derive(Clone, Copy, Debug, clap::Args)]
+struct How {
+    /// MPI ranks; the machine's cores (fewer for small scenes) where it is left out.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    ranks: Option<u32>,
+    /// Remove an earlier run in the same folder and start afresh.
+    #[arg(long)]
+    fresh: bool,
+}
+
+fn main() {
+    let command = Arguments::parse().command;
+    if let Err(failure) = carry_out(command) {
+        eprintln!("talus: {failure}");
+        std::process::exit(failure.code);
+    }
+}
+
+fn carry_out(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Demo { how } => run(&cases::find("column-demo")?, None, paths::runs().join("demo"), how, "demo"),
+        Command::Case { name, out, how } => {
+            let case = cases::find(&name)?;
+            let again = format!("case {name}");
+            let folder = match &out {
+                Some(folder) => paths::from_caller(folder),
+                None => paths::runs().join(&case.name),
+            };
+            run(&case, out.as_deref(), folder, how, &again)
+        }
+        Command::Cases => cases::list(),
+        Command::Validate { names, ranks, reuse } => validate::all(&names, ranks, reuse),
+        Command::Test { arguments } => gate::test(&arguments),
+        Command::Help => {
+            use clap::CommandFactory;
+            Arguments::command().print_long_help().map_err(|e| Failure::cannot_write(format!("cannot print: {e}")))
+        }
+    }
+}
+
+/// Runs a case and prints where its results are. `again`: the words that start the same once more.
+fn run(
+    case: &cases::Case,
+    out: Option<&std::path::Path>,
+    folder: PathBuf,
+    how: How,
+    again: &str,
+) -> Result<(), Failure> {
+    let mut again = format!("./talus {again}");
+    if let Some(out) = out {
+        again += &format!(" --out {}", out.display());
+    }
+    if let Some(ranks) = how.ranks {
+        again += &format!(" --ranks {ranks}");
+    }
+    let programs = stage::Programs::build()?;
+    let job = stage::Job { scene: &case.scene, folder: &folder, ranks: how.ranks, fresh: how.fresh, again: &again };
+    stage::run(&programs, &job)?;
+    eprintln!("talus: finished: {}", case.title);
+    for path in stage::results(&folder) {
+        println!("{}", paths::short(&path).display());
+    }
+    Ok(())
+}

@@ -4,8 +4,8 @@
 
 mod check;
 mod error;
+mod geometry;
 mod raw;
-
 mod walls;
 
 pub use error::{Fault, SceneError};

@@ -1,0 +1,56 @@
+//! Energies of a snapshot.
+
+use crate::geometry::Geometry;
+use formats::snapshot::Rows;
+
+/// Sums over the particles, J: per metre of depth in plane strain, of the modelled part in symmetric scenes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Sum of m v2 / 2.
+    pub kinetic: f64,
+    /// Sum of -m g . x: zero at the origin.
+    pub potential: f64,
+    /// Sum of V sigma : C^-1 : sigma / 2, with the elastic constants of the material.
+    pub elastic: f64,
+}
+
+impl Energy {
+    /// Of all particles.
+    pub fn new(g: &Geometry, rows: &Rows) -> Self {
+        let mut sum = Self::default();
+        for row in 0..rows.len() {
+            let (m, x, v, s) = (rows.mass[row], rows.position[row], rows.velocity[row], rows.stress[row]);
+            sum.kinetic += 0.5 * m * v.iter().map(|v| v * v).sum::<f64>();
+            sum.potential -= m * (0..3).map(|a| g.gravity[a] * x[a]).sum::<f64>();
+            let trace = s[0] + s[1] + s[2];
+            let square = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + 2.0 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]);
+            let density = ((1.0 + g.poisson) * square - g.poisson * trace * trace) / (2.0 * g.young);
+            sum.elastic += m / rows.density[row] * density;
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{block, geometry};
+    use formats::{kernel::Kernel, space::Space};
+
+    #[test]
+    fn energies_of_a_uniform_block() {
+        let g = geometry(Space::PlaneStrain, Kernel::CubicSpline, 0.1);
+        let mut rows = block(&g, [10, 1, 10]);
+        rows.velocity.fill([3.0, 0.0, 4.0]);
+        // Uniaxial stress: sigma2 / 2E. Simple shear: tau2 / 2G.
+        rows.stress.fill([0.0, 0.0, -500.0, 0.0, 0.0, 0.0]);
+        let e = Energy::new(&g, &rows);
+        let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
+        close(e.kinetic, 0.5 * 2000.0 * 25.0);
+        close(e.potential, 2000.0 * 9.81 * 0.5);
+        close(e.elastic, 500.0 * 500.0 / (2.0 * 1e6));
+        rows.stress.fill([0.0, 0.0, 0.0, 0.0, 0.0, 500.0]);
+        let shear = 1e6 / 2.6;
+        close(Energy::new(&g, &rows).elastic, 500.0 * 500.0 / (2.0 * shear));
+    }
+}

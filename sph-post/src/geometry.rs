@@ -1,0 +1,173 @@
+//! What the evaluation needs to know of the scene: the floor, the axis, the sizes everything is scaled with.
+
+use formats::{
+    kernel::Kernel,
+    scene::{Body, Material, Scene, Shape},
+    snapshot::Rows,
+    space::Space,
+};
+use std::f64::consts::PI;
+
+/// The scene, as the evaluation sees it.
+#[derive(Clone, Debug)]
+pub struct Geometry {
+    /// Space.
+    pub space: Space,
+    /// Kernel.
+    pub kernel: Kernel,
+    /// Lattice spacing dx, m: also the width of all bins.
+    pub dx: f64,
+    /// Smoothing length h, m.
+    pub h: f64,
+    /// Gravity, m/s2.
+    pub gravity: [f64; 3],
+    /// Height of the floor, m.
+    pub floor: f64,
+    /// Are x = 0 and y = 0 planes (or, axisymmetric, x = 0 the axis) at which particles are mirrored?
+    pub mirrored: [bool; 2],
+    /// Are profiles taken along the radius (else along x)?
+    pub radial: bool,
+    /// Width of the material across the profile, m: 1 in plane strain, the y extent in 3-D; not for radial profiles.
+    pub width: f64,
+    /// Density at the start, kg/m3.
+    pub density: f64,
+    /// Young's modulus, Pa.
+    pub young: f64,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// The one body's extent along the profile: where it begins and ends, m. `None` with several bodies.
+    pub extent: Option<[f64; 2]>,
+    /// Height of the highest body above the floor at the start, m.
+    pub height: f64,
+    /// Aspect ratio of a cylinder on the axis that starts at rest as the only body: for comparison with Lube et al.
+    pub cylinder_aspect: Option<f64>,
+}
+
+impl Geometry {
+    /// From the scene and the particles at the start (asked for the floor where the scene has none).
+    pub fn new(scene: &Scene, start: &Rows) -> Self {
+        let dx = scene.spacing;
+        let floors = scene.walls.iter().filter(|w| w.axis == 2 && w.side > 0.0).map(|w| w.at);
+        let lowest = start.position.iter().map(|x| x[2]).fold(f64::INFINITY, f64::min) - 0.5 * dx;
+        let floor = floors.reduce(f64::min).unwrap_or(if lowest.is_finite() { lowest } else { 0.0 });
+        let radial = match scene.space {
+            Space::PlaneStrain => false,
+            Space::Axisymmetric => true,
+            Space::ThreeD => scene.symmetry == [true; 2] || scene.bodies.iter().any(on_axis),
+        };
+        let Material::DruckerPrager(law) = &scene.material;
+        let single = if let [body] = &scene.bodies[..] { Some(body) } else { None };
+        let top = scene.bodies.iter().map(|b| bounds(&b.shape).1[2]).fold(f64::NEG_INFINITY, f64::max);
+        Self {
+            space: scene.space,
+            kernel: scene.kernel,
+            dx,
+            h: scene.h(),
+            gravity: scene.gravity,
+            floor,
+            mirrored: if scene.space == Space::Axisymmetric { [true, false] } else { scene.symmetry },
+            radial,
+            width: width(scene),
+            density: law.density,
+            young: law.young,
+            poisson: law.poisson,
+            extent: single.map(|b| extent(b, radial)),
+            height: (top - floor).max(0.0),
+            cylinder_aspect: single.and_then(|b| match b.shape {
+                Shape::Cylinder { radius, height, .. } if on_axis(b) && b.velocity == [0.0; 3] => Some(height / radius),
+                _ => None,
+            }),
+        }
+    }
+
+    /// Where a point lies along the profile, m.
+    pub fn along(&self, x: [f64; 3]) -> f64 {
+        if self.radial { x[0].hypot(x[1]) } else { x[0] }
+    }
+
+    /// Volume of a particle in the sense of the kernel: what sum of V W needs to be one. m2 in the plane spaces.
+    pub fn kernel_volume(&self, x: [f64; 3], volume: f64) -> f64 {
+        match self.space {
+            // On the axis itself the area of a ring says nothing.
+            Space::Axisymmetric => volume / (2.0 * PI * x[0].max(0.25 * self.dx)),
+            _ => volume,
+        }
+    }
+
+    /// Area of the floor under bin `k`, the one between k dx and (k+1) dx, m2: of the modelled part only. Per metre of
+    /// depth in plane strain.
+    pub fn bin_area(&self, k: i64) -> f64 {
+        let k = k as f64;
+        if self.radial {
+            let whole = PI * ((k + 1.0).powi(2) - k * k) * self.dx * self.dx;
+            if self.space == Space::ThreeD { whole * self.modelled() } else { whole }
+        } else {
+            self.width * self.dx
+        }
+    }
+
+    /// Share of the whole that is modelled: 1/2 for each plane of symmetry.
+    pub fn modelled(&self) -> f64 {
+        match self.space {
+            Space::Axisymmetric => 1.0,
+            _ => self.mirrored.iter().map(|&m| if m { 0.5 } else { 1.0 }).product(),
+        }
+    }
+
+    /// Initial extent r0 of the single body along the profile, m.
+    pub fn r0(&self) -> Option<f64> {
+        self.extent.map(|[begin, end]| end - begin)
+    }
+
+    /// Time scale sqrt(H0/g), s.
+    pub fn time_scale(&self) -> Option<f64> {
+        let g = self.gravity[2].abs();
+        (g > 0.0 && self.height > 0.0).then(|| (self.height / g).sqrt())
+    }
+
+    /// Name of the coordinate along profiles: `r` or `x`.
+    pub fn coordinate(&self) -> &'static str {
+        if self.radial { "r" } else { "x" }
+    }
+}
+
+fn on_axis(body: &Body) -> bool {
+    matches!(body.shape, Shape::Cylinder { base, .. } if base[0] == 0.0 && base[1] == 0.0)
+}
+
+/// Lower and upper corner of a shape, m.
+fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {
+    match *shape {
+        Shape::Cylinder { base: b, radius: r, height } => {
+            ([b[0] - r, b[1] - r, b[2]], [b[0] + r, b[1] + r, b[2] + height])
+        }
+        Shape::Box { min, max } => (min, max),
+        Shape::Wedge { corner: c, size: s, falls_left } => {
+            let (low, high) = if falls_left { (c[0] - s[0], c[0]) } else { (c[0], c[0] + s[0]) };
+            ([low, c[1], c[2]], [high, c[1] + s[1], c[2] + s[2]])
+        }
+    }
+}
+
+/// Where a body begins and ends along the profile.
+fn extent(body: &Body, radial: bool) -> [f64; 2] {
+    let (low, high) = bounds(&body.shape);
+    if radial { [low[0].max(0.0), high[0]] } else { [low[0], high[0]] }
+}
+
+/// Extent of the material along y: between two walls, or that of the bodies.
+fn width(scene: &Scene) -> f64 {
+    if scene.space != Space::ThreeD {
+        return 1.0;
+    }
+    let boxes = || scene.bodies.iter().map(|b| bounds(&b.shape));
+    let mut low = boxes().map(|b| b.0[1]).fold(f64::INFINITY, f64::min);
+    let mut high = boxes().map(|b| b.1[1]).fold(f64::NEG_INFINITY, f64::max);
+    for wall in scene.walls.iter().filter(|w| w.axis == 1) {
+        if wall.side > 0.0 { low = wall.at } else { high = wall.at }
+    }
+    if scene.symmetry[1] {
+        low = low.max(0.0);
+    }
+    (high - low).max(scene.spacing)
+}

@@ -1,0 +1,1 @@
+use crate::{analysis::Analysis,failure::Failure};use std::path::*;pub fn pictures(_:&Analysis,_:&Path)->Result<Vec<PathBuf>,Failure>{Ok(vec![])}

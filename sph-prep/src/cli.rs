@@ -1,0 +1,40 @@
+//! The command line.
+
+use clap::Parser;
+use std::path::PathBuf;
+
+/// Make a run folder from a scene: particles, the scene as it was, and where they come from.
+///
+/// Works alone or under mpirun; the particles are the same on any number of ranks.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "sph-prep", version, after_help = EXIT_CODES)]
+pub struct Arguments {
+    /// The scene file
+    pub scene: PathBuf,
+    /// The run folder to make; it must not exist yet, or be empty
+    #[arg(short, long, value_name = "RUN")]
+    pub output: PathBuf,
+    /// Print warnings and errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+   0  the run folder is ready; its path is on standard output
+   2  the command line or the scene is wrong
+  65  the scene file is missing or not a text file
+  73  the run folder cannot be written, or is not empty";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Arguments::command().debug_assert();
+        let arguments = Arguments::try_parse_from(["sph-prep", "scene.toml", "-o", "run/"]).unwrap();
+        assert!(!arguments.quiet);
+    }
+}

@@ -1,0 +1,160 @@
+//! `sph-prep`: from a scene to the particles a run starts with, on any number of ranks.
+//!
+//! Rank 0 reads the scene and speaks; every rank checks it, makes its share of the particles, and writes it into the
+//! one file of all ranks. Failures are agreed upon after each part, so that all ranks leave together.
+
+pub mod cli;
+pub mod failure;
+pub mod fill;
+pub mod initial;
+pub mod output;
+pub mod shape;
+pub mod summary;
+#[cfg(test)]
+mod testing;
+pub mod text;
+pub mod wall;
+
+use clap::Parser;
+use cli::Arguments;
+use failure::{Failure, agree};
+use fill::Plan;
+use formats::{
+    exit,
+    provenance::{self, Entry},
+    scene::{Fault, Scene, SceneError},
+    schema::Kept,
+    snapshot::{self, Header, Rows},
+};
+use mpi::{collective::SystemOperation, topology::SimpleCommunicator, traits::*};
+use output::Staging;
+use std::{ffi::OsString, os::unix::ffi::OsStringExt, path::PathBuf};
+
+/// Exit code of a panic, as Rust has it: a bug, none of [`exit`].
+const PANIC: i32 = 101;
+
+/// Runs the whole stage and returns the exit code, the same on all ranks. MPI is set up and wound up within.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> i32 {
+    let Some(universe) = mpi::initialize() else {
+        eprintln!("sph-prep: MPI is running already; it can be started only once");
+        return PANIC;
+    };
+    // One rank that unwinds would leave the others waiting for ever.
+    let print = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        print(panic);
+        SimpleCommunicator::world().abort(PANIC);
+    }));
+    let world = universe.world();
+    let talks = world.rank() == 0;
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(message) => {
+            if talks {
+                // Help goes to standard output, errors to standard error; a closed pipe is nobody's concern.
+                let _ = message.print();
+            }
+            return if message.use_stderr() { exit::USAGE } else { exit::DONE };
+        }
+    };
+    let mut text = String::new();
+    match prepare(&arguments, &world, &mut text) {
+        Ok(()) => {
+            if talks {
+                println!("{}", arguments.output.display());
+            }
+            exit::DONE
+        }
+        Err(failure) => {
+            if talks {
+                text::print(&failure, &text);
+            }
+            failure.exit_code()
+        }
+    }
+}
+
+/// Makes the run folder. `text` receives the scene's text, for messages. Collective.
+///
+/// # Errors
+/// Any [`Failure`]; all ranks return one with the same exit code, and nothing is left behind.
+fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) -> Result<(), Failure> {
+    let talks = comm.rank() == 0;
+    let says = |message: String| {
+        if talks && !arguments.quiet {
+            eprint!("{message}");
+        }
+    };
+    *text = text::share(&arguments.scene, comm)?;
+    let scene = Scene::read(&arguments.scene.display().to_string(), text)?;
+
+    let staging = if talks { Staging::new(&arguments.output).map(Some) } else { Ok(None) };
+    let staging = agree(comm, staging)?;
+
+    let plan = Plan::new(&scene, comm);
+    let bodies = bodies(&scene, &plan, comm);
+    if let Some(empty) = bodies.iter().find(|b| b.particles == 0) {
+        return Err(no_particles(arguments, text, &empty.name).into());
+    }
+    says(summary::head(&scene, &bodies));
+    if talks {
+        eprint!("{}", summary::warnings(&bodies));
+    }
+    let rows = plan.particles(&scene, snapshot::share(plan.total(), comm.rank() as u64, comm.size() as u64));
+    let walls = wall::within_reach(&scene, &rows, comm);
+    says(summary::cost(&scene, plan.total(), walls, comm.size()));
+
+    write(&scene, text, &rows, plan.total(), staging, comm)
+}
+
+fn bodies(scene: &Scene, plan: &Plan, comm: &SimpleCommunicator) -> Vec<summary::Body> {
+    let count = scene.bodies.len();
+    let mine: Vec<f64> = (0..count).map(|body| plan.volume(body, comm.rank() as u64)).collect();
+    let mut volumes = vec![0.0; count];
+    comm.all_reduce_into(&mine[..], &mut volumes[..], SystemOperation::sum());
+    let particles: Vec<u64> = (0..count).map(|body| plan.body(body)).map(|ids| ids.end - ids.start).collect();
+    summary::bodies(scene, &plan.lattices, &particles, &volumes)
+}
+
+/// A body that falls through the lattice.
+fn no_particles(arguments: &Arguments, text: &str, body: &str) -> SceneError {
+    let title = format!("[body.{body}]");
+    let line = text.lines().position(|line| line.trim_start().starts_with(&title)).map_or(1, |at| at + 1);
+    let message = "holds no particle; it must be larger than the spacing, on the positive side of planes of symmetry";
+    let fault = Fault { line, column: 1, key: format!("body.{body}"), message: message.into() };
+    SceneError { file: arguments.scene.display().to_string(), faults: vec![fault] }
+}
+
+/// Writes everything, rank 0 the small files and all ranks the particles, and gives the folder its name.
+fn write(
+    scene: &Scene,
+    text: &str,
+    rows: &Rows,
+    count: u64,
+    staging: Option<Staging>,
+    comm: &SimpleCommunicator,
+) -> Result<(), Failure> {
+    let path = staging.as_ref().map_or(Vec::new(), |s| s.folder().initial().into_os_string().into_vec());
+    let path = PathBuf::from(OsString::from_vec(text::broadcast(path, comm)));
+    let header = Header {
+        title: scene.title.clone(),
+        scene_hash: Scene::hash(text),
+        space: scene.space,
+        kernel: scene.kernel,
+        spacing: scene.spacing,
+        h: scene.h(),
+        gravity: scene.gravity,
+        time: 0.0,
+        step: 0,
+        count,
+    };
+    let written = snapshot::write(&path, &header, rows, Kept::Everywhere, comm).map_err(Failure::from);
+    agree(comm, written)?;
+    let finished = staging.map_or(Ok(()), |staging| {
+        let folder = staging.folder().clone();
+        staging.write(&folder.scene(), text.as_bytes())?;
+        provenance::append(&folder.provenance(), Entry::this("sph-prep", comm.size() as usize))?;
+        staging.publish()
+    });
+    agree(comm, finished)
+}

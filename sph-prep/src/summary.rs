@@ -1,0 +1,176 @@
+//! What the user is told before anything is written.
+
+use crate::shape::Lattice;
+use formats::{scene::Scene, space::Space};
+
+/// Memory `sph-run` needs for a particle, virtual ones included, bytes: state, rates, neighbour list and buffers of
+/// the halo. An estimate.
+pub const BYTES_PER_PARTICLE: u64 = 1000;
+
+/// A body's volume may differ from its lattice's by so much, per cent, before a warning.
+pub const TOLERATED_DEVIATION: f64 = 2.0;
+
+/// A body in numbers.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Its name.
+    pub name: String,
+    /// Number of particles.
+    pub particles: u64,
+    /// Volume of the shape; m2 in plane strain, else m3.
+    pub ideal: f64,
+    /// Volume of the particles, in the same unit.
+    pub discrete: f64,
+}
+
+impl Body {
+    /// By how much the particles' volume differs from the shape's, per cent.
+    pub fn deviation(&self) -> f64 {
+        100.0 * (self.discrete / self.ideal - 1.0)
+    }
+}
+
+/// Bodies in numbers; `discrete` is their volume summed over all ranks.
+pub fn bodies(scene: &Scene, lattices: &[Lattice], particles: &[u64], discrete: &[f64]) -> Vec<Body> {
+    let one = |n: usize| Body {
+        name: scene.bodies[n].name.clone(),
+        particles: particles[n],
+        ideal: lattices[n].ideal_volume(),
+        discrete: discrete[n],
+    };
+    (0..lattices.len()).map(one).collect()
+}
+
+/// The scene and its bodies; printed before the particles are made, so that a slip in the spacing shows before it
+/// eats the memory.
+pub fn head(scene: &Scene, bodies: &[Body]) -> String {
+    let mut out = String::new();
+    let mut line = |name: &str, text: String| out += &format!("{name:<12} {text}\n");
+    let kernel = scene.kernel.name();
+    let part = match scene.symmetry {
+        [true, true] => ", symmetric about x = 0 and y = 0",
+        [true, false] => ", symmetric about x = 0",
+        [false, true] => ", symmetric about y = 0",
+        [false, false] => "",
+    };
+    line("scene", scene.title.clone());
+    line("space", format!("{}{part}", scene.space.name()));
+    line("lattice", format!("dx = {} m, h = {} m ({kernel})", short(scene.spacing), short(scene.h())));
+    let unit = if scene.space == Space::PlaneStrain { "m2" } else { "m3" };
+    for body in bodies {
+        let (ideal, discrete) = (short(body.ideal), short(body.discrete));
+        let volumes = format!("volume {ideal} {unit}, as particles {discrete} {unit} ({:+.2} %)", body.deviation());
+        line("body", format!("{}: {} particles, {volumes}", body.name, body.particles));
+    }
+    out
+}
+
+/// Warnings about the bodies, one a line.
+pub fn warnings(bodies: &[Body]) -> String {
+    let mut out = String::new();
+    for body in bodies.iter().filter(|b| b.deviation().abs() > TOLERATED_DEVIATION) {
+        let (name, deviation) = (&body.name, body.deviation());
+        let advice = "choose a spacing that divides its sizes, or a finer one";
+        out += &format!("warning: body {name}: the volume of its particles is off by {deviation:+.1} %; {advice}\n");
+    }
+    out
+}
+
+/// What the run will cost.
+pub fn cost(scene: &Scene, particles: u64, walls: u64, ranks: i32) -> String {
+    let mut out = String::new();
+    let mut line = |name: &str, text: String| out += &format!("{name:<12} {text}\n");
+    line("walls", format!("about {walls} virtual particles within reach at the start"));
+    let bytes = memory(particles, walls);
+    line("memory", format!("about {} for sph-run, all ranks together", size(bytes)));
+    let (dt, steps) = time_step(scene);
+    line("sound speed", format!("{} m/s", short(scene.material.sound_speed())));
+    line("time step", format!("about {} s, {steps} steps to {} s", short(dt), short(scene.end.time)));
+    line("snapshots", format!("{}, every {} s", snapshots(scene), short(scene.output.snapshots)));
+    line("prepared on", format!("{ranks} rank{}", if ranks == 1 { "" } else { "s" }));
+    out
+}
+
+/// Bytes `sph-run` is expected to need.
+pub fn memory(particles: u64, walls: u64) -> u64 {
+    (particles + walls) * BYTES_PER_PARTICLE
+}
+
+/// The first time step, s, and the number of such steps to the end.
+pub fn time_step(scene: &Scene) -> (f64, u64) {
+    let speed = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let fastest = scene.bodies.iter().map(|b| speed(b.velocity)).fold(0.0, f64::max);
+    let dt = scene.numerics.courant * scene.h() / (scene.material.sound_speed() + fastest);
+    (dt, (scene.end.time / dt).ceil() as u64)
+}
+
+/// Number of snapshots, the first and the last included.
+pub fn snapshots(scene: &Scene) -> u64 {
+    // A hair more than a whole number of intervals is a whole number.
+    (scene.end.time / scene.output.snapshots - 1e-9).ceil() as u64 + 1
+}
+
+/// A number to five digits, without trailing zeros.
+fn short(x: f64) -> String {
+    if x != 0.0 && !(1e-3..1e6).contains(&x.abs()) {
+        let text = format!("{x:.4e}");
+        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        return format!("{}e{exponent}", trimmed(mantissa));
+    }
+    let digits = if x == 0.0 { 0 } else { (4 - x.abs().log10().floor() as i32).max(0) as usize };
+    trimmed(&format!("{x:.digits$}")).to_owned()
+}
+
+fn trimmed(number: &str) -> &str {
+    if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
+}
+
+fn size(bytes: u64) -> String {
+    let mut value = bytes as f64;
+    for unit in ["B", "kB", "MB", "GB"] {
+        if value < 1000.0 {
+            return format!("{value:.0} {unit}");
+        }
+        value /= 1000.0;
+    }
+    format!("{value:.1} TB")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::scene;
+    use formats::scene::Shape;
+
+    #[test]
+    fn numbers_are_short() {
+        let cases = [(0.004, "0.004"), (1.0 / 3.0, "0.33333"), (0.0, "0"), (4.2e-5, "4.2e-5"), (1234567.0, "1.2346e6")];
+        for (x, text) in cases {
+            assert_eq!(short(x), text);
+        }
+        assert_eq!(short(100.0), "100");
+        assert_eq!(size(1_234_567), "1 MB");
+    }
+
+    #[test]
+    fn a_coarse_body_is_warned_of() {
+        let body = |discrete| Body { name: "heap".into(), particles: 1, ideal: 1.0, discrete };
+        assert_eq!(warnings(&[body(1.019), body(0.981)]), "");
+        let warned = warnings(&[body(0.97)]);
+        assert!(warned.contains("heap") && warned.contains("-3.0 %"), "{warned}");
+    }
+
+    #[test]
+    fn the_time_step_follows_the_fastest_body() {
+        let mut scene = scene(Space::PlaneStrain, 0.01, Shape::Box { min: [0.0; 3], max: [0.1, 0.0, 0.1] });
+        let c = scene.material.sound_speed();
+        let (dt, steps) = time_step(&scene);
+        assert!((dt - 0.6 * 0.012 / c).abs() < 1e-15);
+        assert_eq!(steps, (1.0 / dt).ceil() as u64);
+        scene.bodies[0].velocity = [3.0, 0.0, 4.0];
+        assert!((time_step(&scene).0 - 0.6 * 0.012 / (c + 5.0)).abs() < 1e-15);
+        assert_eq!(snapshots(&scene), 21);
+        scene.output.snapshots = 0.3;
+        assert_eq!(snapshots(&scene), 5);
+    }
+}

@@ -1,0 +1,32 @@
+//! Scenes for the unit tests.
+
+use formats::{kernel::Kernel, scene::*, space::Space};
+
+/// A scene with one body and no walls.
+pub fn scene(space: Space, spacing: f64, shape: Shape) -> Scene {
+    Scene {
+        title: "test".into(),
+        space,
+        spacing,
+        gravity: [0.0, 0.0, -9.81],
+        symmetry: [false; 2],
+        kernel: Kernel::CubicSpline,
+        h_over_dx: 1.2,
+        material: Material::DruckerPrager(DruckerPrager {
+            density: 2600.0,
+            young: 5.98e6,
+            poisson: 0.3,
+            friction_deg: 30.0,
+            dilation_deg: 0.0,
+            cohesion: 0.0,
+            cone: Cone::Compression,
+            rotation: Rotation::Jaumann,
+        }),
+        bodies: vec![Body { name: "body".into(), shape, velocity: [0.0; 3] }],
+        walls: Vec::new(),
+        initial: Initial { stress: InitialStress::Zero, jitter: 0.0, seed: 1 },
+        numerics: Numerics { courant: 0.6, viscosity: 0.1, damping: 0.0 },
+        end: End { time: 1.0, at_rest: None },
+        output: Output { snapshots: 0.05, history: 0.01 },
+    }
+}

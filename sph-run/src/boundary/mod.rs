@@ -1,0 +1,5 @@
+//! What surrounds the owned particles: mirror images behind symmetry planes and virtual particles behind walls.
+//! Both are made when neighbour lists are built and refilled every step.
+
+pub mod mirror;
+pub mod wall;

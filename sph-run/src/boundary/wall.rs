@@ -1,0 +1,99 @@
+//! Virtual wall particles (Yang et al. 2020, Eqs 29-32): on lattice sites behind the walls within reach of owned
+//! material, with velocity and stress extrapolated from the material by Shepard's interpolation, then reflected.
+//!
+//! No rank holds the wall: each makes the sites it needs, from their lattice coordinates, whenever it builds its
+//! neighbour lists, so walls go where the flow goes. Every rank extrapolates for itself; its halo is wide enough along
+//! the walls for the same sums, term by term, on all of them.
+
+use crate::boundary::mirror::reflect_stress;
+use crate::neighbors::Neighbors;
+use crate::particles::Particles;
+use crate::physics::Kernel;
+use crate::space::Space;
+use crate::sweep::{self, Pairs};
+use formats::scene::{Site, WallLattice};
+
+/// What a wall does to the velocity and the stress extrapolated behind it.
+#[derive(Clone, Copy, Debug)]
+struct Parity {
+    velocity: [f64; 3],
+    reflected: [bool; 3],
+}
+
+/// The virtual particles of one rank.
+#[derive(Clone, Debug)]
+pub struct Walls {
+    lattice: WallLattice,
+    volume: f64,
+    parities: Vec<Parity>,
+    weights: Vec<f64>,
+}
+
+impl Walls {
+    /// For walls on `lattice`, whose particles have the given volume dx^D.
+    pub fn new(lattice: WallLattice, volume: f64) -> Self {
+        Self { lattice, volume, parities: Vec::new(), weights: Vec::new() }
+    }
+
+    /// Signed distance of a point to the nearest wall, m.
+    pub fn distance<const D: usize, const N: usize, S: Space<D, N>>(&self, x: crate::algebra::Vector<D>) -> f64 {
+        self.lattice.distance(S::to_disk(x))
+    }
+
+    /// Appends the wall sites within `reach` of owned particles.
+    pub fn create<const D: usize, const N: usize, S: Space<D, N>>(&mut self, p: &mut Particles<D, N>, reach: f64) {
+        debug_assert_eq!(p.mirror, p.len());
+        let mut sites: Vec<(u64, Site)> = Vec::new();
+        for i in 0..p.owned {
+            self.lattice.near(S::to_disk(p.x[i]), reach, |site| sites.push((WallLattice::id(site), site)));
+            if sites.len() > 1 << 20 {
+                unique(&mut sites);
+            }
+        }
+        unique(&mut sites);
+        self.parities.clear();
+        for (key, site) in sites {
+            let place = self.lattice.position(site);
+            let (velocity, reflected) = self.lattice.parity(place);
+            self.parities.push(Parity { velocity, reflected });
+            p.key.push(key);
+            p.x.push(S::from_disk(place));
+            p.volume.push(self.volume);
+        }
+        p.resize(p.key.len());
+    }
+
+    /// Extrapolates velocities; remembers the weights for the stresses of the same step.
+    pub fn fill_motion<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
+        &mut self,
+        p: &mut Particles<D, N>,
+        neighbors: &Neighbors,
+        pairs: Pairs,
+    ) {
+        sweep::wall_weights::<D, N, K>(p, neighbors, pairs, &mut self.weights);
+        for (wall, parity) in self.parities.iter().enumerate() {
+            let mut v = S::to_disk(sweep::extrapolate(neighbors, &self.weights, wall, &p.v));
+            for a in 0..3 {
+                v[a] *= parity.velocity[a];
+            }
+            p.v[p.mirror + wall] = S::from_disk(v);
+        }
+    }
+
+    /// Extrapolates stresses.
+    pub fn fill_stress<const D: usize, const N: usize, S: Space<D, N>>(
+        &self,
+        p: &mut Particles<D, N>,
+        neighbors: &Neighbors,
+    ) {
+        for (wall, parity) in self.parities.iter().enumerate() {
+            let stress = S::stress_to_disk(sweep::extrapolate(neighbors, &self.weights, wall, &p.stress));
+            p.stress[p.mirror + wall] = S::stress_from_disk(reflect_stress(stress, parity.reflected));
+        }
+    }
+}
+
+fn unique(sites: &mut Vec<(u64, Site)>) {
+    sites.sort_unstable_by_key(|(key, _)| *key);
+    sites.dedup_by_key(|(key, _)| *key);
+}

@@ -1,0 +1,125 @@
+//! Elastic, perfectly plastic material with the Drucker-Prager criterion.
+
+use super::{History, Material, rotation};
+use crate::algebra::Sym;
+use formats::scene::{self, Cone, Rotation};
+
+const THIRD: f64 = 1.0 / 3.0;
+
+/// The Drucker-Prager law f = alpha I1 + sqrt(J2) - k with the potential g = alpha_psi I1 + sqrt(J2)
+/// (Yang et al. 2020, Eqs 11-14).
+///
+/// A step is Hooke's law followed by the closed-form backward-Euler return to the cone, or to its apex where the cone
+/// can't be reached. Without dilation this is the two-stage correction of Bui et al. (2008): tension cracking, then
+/// radial scaling at fixed I1. With dilation the scaling would leave the flow rule; the return does not.
+#[derive(Clone, Copy, Debug)]
+pub struct DruckerPrager {
+    /// Bulk modulus K, Pa.
+    pub bulk: f64,
+    /// Shear modulus G, Pa.
+    pub shear: f64,
+    /// Friction constant of the cone.
+    pub alpha: f64,
+    /// Cohesion constant of the cone, Pa.
+    pub k: f64,
+    /// Friction constant of the plastic potential.
+    pub alpha_psi: f64,
+    /// How the stress turns with the material.
+    pub rotation: Rotation,
+    /// I1 at the apex, Pa; infinite without friction, where the cone is a cylinder.
+    apex: f64,
+    /// 9 K alpha_psi/(G + 9 K alpha alpha_psi): fall of I1 per unit of f, 0 without dilation.
+    relief: f64,
+    /// Deviatoric plastic strain per fall of sqrt(J2): 1/(sqrt(3) G).
+    strain_per_stress: f64,
+    sound_speed: f64,
+}
+
+/// Constants (alpha, k) of the cone that stands for a Mohr-Coulomb material; k has the unit of `cohesion`.
+pub fn cone(kind: Cone, friction_deg: f64, cohesion: f64) -> (f64, f64) {
+    let phi = friction_deg.to_radians();
+    let (sin, cos, tan) = (phi.sin(), phi.cos(), phi.tan());
+    let corners = |denominator: f64| (2.0 * sin / denominator, 6.0 * cohesion * cos / denominator);
+    match kind {
+        Cone::Compression => corners(3f64.sqrt() * (3.0 - sin)),
+        Cone::Extension => corners(3f64.sqrt() * (3.0 + sin)),
+        Cone::PlaneStrain => {
+            let denominator = (9.0 + 12.0 * tan * tan).sqrt();
+            (tan / denominator, 3.0 * cohesion / denominator)
+        }
+        Cone::PlaneStrainIsochoric => (sin / 3.0, cohesion * cos),
+    }
+}
+
+impl DruckerPrager {
+    /// The law of a checked scene.
+    pub fn new(scene: &scene::DruckerPrager) -> Self {
+        let (bulk, shear) = (scene.bulk(), scene.shear());
+        let (alpha, k) = cone(scene.cone, scene.friction_deg, scene.cohesion);
+        let (alpha_psi, _) = cone(scene.cone, scene.dilation_deg, 0.0);
+        Self {
+            bulk,
+            shear,
+            alpha,
+            k,
+            alpha_psi,
+            rotation: scene.rotation,
+            apex: if alpha > 0.0 { k / alpha } else { f64::INFINITY },
+            relief: 9.0 * bulk * alpha_psi / (shear + 9.0 * bulk * alpha * alpha_psi),
+            strain_per_stress: 1.0 / (3f64.sqrt() * shear),
+            sound_speed: ((bulk + 4.0 / 3.0 * shear) / scene.density).sqrt(),
+        }
+    }
+
+    /// Yield function f, Pa: negative inside the cone.
+    pub fn yield_function<const N: usize>(&self, stress: Sym<N>) -> f64 {
+        let deviator = stress.deviator();
+        self.alpha * stress.trace() + (0.5 * deviator.contract(deviator)).sqrt() - self.k
+    }
+
+    /// Hooke's law: the stress after an elastic strain.
+    #[inline(always)]
+    fn elastic<const N: usize>(&self, stress: Sym<N>, strain: Sym<N>) -> Sym<N> {
+        let volumetric = (self.bulk - 2.0 * THIRD * self.shear) * strain.trace();
+        stress + strain * (2.0 * self.shear) + Sym::isotropic(volumetric)
+    }
+}
+
+impl Material for DruckerPrager {
+    #[inline(always)]
+    fn stress<const N: usize>(&self, stress: Sym<N>, strain: Sym<N>, history: &mut History) -> Sym<N> {
+        let trial = self.elastic(stress, strain);
+        let trace = trial.trace();
+        let deviator = trial - Sym::isotropic(trace * THIRD);
+        let root_j2 = (0.5 * deviator.contract(deviator)).sqrt();
+        let f = self.alpha * trace + root_j2 - self.k;
+        if f <= 0.0 {
+            return trial;
+        }
+        // On the cone sqrt(J2) follows from I1, and more exactly than from the multiplier. What the cone can't take
+        // (nothing left of the deviator, or none to begin with) goes to the apex.
+        let on_cone = trace - self.relief * f;
+        let left = self.k - self.alpha * on_cone;
+        if left > 0.0 && root_j2 > 0.0 {
+            history.plastic_strain += (root_j2 - left).max(0.0) * self.strain_per_stress;
+            deviator * (left / root_j2) + Sym::isotropic(on_cone * THIRD)
+        } else {
+            history.plastic_strain += root_j2 * self.strain_per_stress;
+            Sym::isotropic(on_cone.min(self.apex) * THIRD)
+        }
+    }
+
+    #[inline(always)]
+    fn rotate<const N: usize>(&self, stress: Sym<N>, spin: [f64; 3], dt: f64) -> Sym<N> {
+        rotation::rotate(stress, spin, dt, self.rotation)
+    }
+
+    fn elastic_energy<const N: usize>(&self, stress: Sym<N>) -> f64 {
+        let (trace, deviator) = (stress.trace(), stress.deviator());
+        trace * trace / (18.0 * self.bulk) + deviator.contract(deviator) / (4.0 * self.shear)
+    }
+
+    fn sound_speed(&self) -> f64 {
+        self.sound_speed
+    }
+}

@@ -1,0 +1,170 @@
+//! The particles of one rank, one `Vec` a field, in contiguous index ranges `owned | halo | mirror | wall`.
+
+use crate::algebra::{Sym, Vector};
+use crate::material::History;
+use crate::space::Space;
+use formats::snapshot::Rows;
+
+/// Bits of a key that name the mirror image; 0 is the particle itself.
+const IMAGE_BITS: u32 = 2;
+
+/// Key of a material particle or of one of its mirror images: ascending keys are the order of every sum over
+/// neighbours. Wall particles carry the keys of [`formats::scene::WallLattice::id`], above all of these.
+pub fn key(id: u64, image: u8) -> u64 {
+    id << IMAGE_BITS | u64::from(image)
+}
+
+/// The global particle number of a key.
+pub fn id(key: u64) -> u64 {
+    key >> IMAGE_BITS
+}
+
+/// Particles of one rank.
+///
+/// The first group of fields covers all ranges, the second only `0..owned`.
+#[derive(Clone, Debug, Default)]
+pub struct Particles<const D: usize, const N: usize> {
+    /// End of the owned particles.
+    pub owned: usize,
+    /// End of the copies of other ranks' particles.
+    pub halo: usize,
+    /// End of the mirror images; wall particles follow.
+    pub mirror: usize,
+
+    /// Order of sums, see [`key`].
+    pub key: Vec<u64>,
+    /// Position, m.
+    pub x: Vec<Vector<D>>,
+    /// Velocity, m/s; at the half step while rates are taken.
+    pub v: Vec<Vector<D>>,
+    /// Volume V = m/rho; area of the ring's section in the axisymmetric space.
+    pub volume: Vec<f64>,
+    /// Stress, Pa.
+    pub stress: Vec<Sym<N>>,
+
+    /// Acceleration, m/s2.
+    pub a: Vec<Vector<D>>,
+    /// Mass, kg.
+    pub mass: Vec<f64>,
+    /// Density, kg/m3.
+    pub density: Vec<f64>,
+    /// What the material remembers.
+    pub history: Vec<History>,
+    /// Index of the scene's body.
+    pub body: Vec<u64>,
+}
+
+/// u64 words that carry one particle between ranks, for D coordinates and N stress components.
+pub const fn packed_len(d: usize, n: usize) -> usize {
+    3 * d + n + 5
+}
+
+impl<const D: usize, const N: usize> Particles<D, N> {
+    /// From rows of a particle file; accelerations are zero where the file has none.
+    pub fn from_rows<S: Space<D, N>>(rows: &Rows) -> Self {
+        let mut particles = Self::default();
+        for i in 0..rows.len() {
+            particles.key.push(key(rows.id[i], 0));
+            particles.x.push(S::from_disk(rows.position[i]));
+            particles.v.push(S::from_disk(rows.velocity[i]));
+            particles.stress.push(S::stress_from_disk(rows.stress[i]));
+            particles.a.push(rows.acceleration.get(i).map_or_else(Vector::default, |&a| S::from_disk(a)));
+            particles.mass.push(rows.mass[i]);
+            particles.density.push(rows.density[i]);
+            particles.history.push(History { plastic_strain: rows.plastic_strain[i] });
+            particles.body.push(rows.body[i]);
+        }
+        particles.volume = vec![0.0; rows.len()];
+        particles.own(rows.len());
+        particles
+    }
+
+    /// The owned particles as rows of a file, in the order they have here.
+    pub fn to_rows<S: Space<D, N>>(&self) -> Rows {
+        let owned = 0..self.owned;
+        Rows {
+            first: 0,
+            id: self.key[owned.clone()].iter().map(|&k| id(k)).collect(),
+            body: self.body.clone(),
+            position: self.x[owned.clone()].iter().map(|&x| S::to_disk(x)).collect(),
+            velocity: self.v[owned.clone()].iter().map(|&v| S::to_disk(v)).collect(),
+            acceleration: self.a.iter().map(|&a| S::to_disk(a)).collect(),
+            mass: self.mass.clone(),
+            density: self.density.clone(),
+            stress: self.stress[owned].iter().map(|&s| S::stress_to_disk(s)).collect(),
+            plastic_strain: self.history.iter().map(|h| h.plastic_strain).collect(),
+        }
+    }
+
+    /// Declares the first `count` particles owned and forgets all others.
+    pub fn own(&mut self, count: usize) {
+        (self.owned, self.halo, self.mirror) = (count, count, count);
+        self.resize(count);
+    }
+
+    /// Resizes the fields that cover all ranges.
+    pub fn resize(&mut self, len: usize) {
+        self.key.resize(len, 0);
+        self.x.resize(len, Vector::default());
+        self.v.resize(len, Vector::default());
+        self.volume.resize(len, 0.0);
+        self.stress.resize(len, Sym::default());
+    }
+
+    /// Number of particles in all ranges.
+    pub fn len(&self) -> usize {
+        self.key.len()
+    }
+
+    /// No particles at all?
+    pub fn is_empty(&self) -> bool {
+        self.key.is_empty()
+    }
+
+    /// Appends owned particle `i` to a message.
+    pub fn pack(&self, i: usize, message: &mut Vec<u64>) {
+        let bits = |f: &f64| f.to_bits();
+        message.extend([self.key[i], self.body[i]]);
+        message.extend([self.mass[i], self.density[i], self.history[i].plastic_strain].iter().map(bits));
+        message.extend(self.x[i].0.iter().chain(&self.v[i].0).chain(&self.a[i].0).map(bits));
+        message.extend(self.stress[i].0.iter().map(bits));
+    }
+
+    /// Takes in the particles of a message as owned ones; there must be no other ranges.
+    pub fn unpack(&mut self, message: &[u64]) {
+        debug_assert_eq!(self.owned, self.len());
+        for words in message.chunks_exact(packed_len(D, N)) {
+            let real = |k: usize| f64::from_bits(words[k]);
+            let vector = |k: usize| Vector(std::array::from_fn(|a| real(k + a)));
+            self.key.push(words[0]);
+            self.body.push(words[1]);
+            self.mass.push(real(2));
+            self.density.push(real(3));
+            self.history.push(History { plastic_strain: real(4) });
+            self.x.push(vector(5));
+            self.v.push(vector(5 + D));
+            self.a.push(vector(5 + 2 * D));
+            self.stress.push(Sym(std::array::from_fn(|a| real(5 + 3 * D + a))));
+            self.volume.push(0.0);
+        }
+        self.own(self.key.len());
+    }
+
+    /// Keeps the owned particles `order[0], order[1], ..` in that order and forgets all others.
+    pub fn arrange(&mut self, order: &[u32]) {
+        fn pick<T: Copy>(field: &mut Vec<T>, order: &[u32]) {
+            *field = order.iter().map(|&i| field[i as usize]).collect();
+        }
+        pick(&mut self.key, order);
+        pick(&mut self.x, order);
+        pick(&mut self.v, order);
+        pick(&mut self.volume, order);
+        pick(&mut self.stress, order);
+        pick(&mut self.a, order);
+        pick(&mut self.mass, order);
+        pick(&mut self.density, order);
+        pick(&mut self.history, order);
+        pick(&mut self.body, order);
+        self.own(order.len());
+    }
+}

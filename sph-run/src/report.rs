@@ -1,0 +1,170 @@
+//! The lines of the history: totals over all ranks, the same bits on any number of them.
+
+use crate::exact::{self, Sum};
+use crate::material::Material;
+use crate::parallel::comm::Reduce;
+use crate::physics::Physics;
+use crate::simulation::Simulation;
+use crate::space::Space;
+use formats::scene::{Scene, Shape};
+
+/// Names and units of the columns, as in the first line of the file.
+pub const COLUMNS: [&str; 14] = [
+    "time [s]",
+    "step [1]",
+    "time_step [s]",
+    "kinetic_energy [J]",
+    "potential_energy [J]",
+    "elastic_energy [J]",
+    "max_speed [m/s]",
+    "front [m]",
+    "front_mass_99_5 [m]",
+    "height [m]",
+    "volume_ratio [1]",
+    "min_density [kg/m3]",
+    "max_density [kg/m3]",
+    "below_floor [1]",
+];
+
+/// One line of the history.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    pub kinetic: f64,
+    pub potential: f64,
+    pub elastic: f64,
+    pub max_speed: f64,
+    /// Farthest particle from the axis, or along x, plus half a spacing, m.
+    pub front: f64,
+    /// Distance within which 99.5 % of the mass lies, m.
+    pub front_mass: f64,
+    /// Top of the highest particle above the floor, m.
+    pub height: f64,
+    /// Volume over that of the same mass at the initial density.
+    pub volume_ratio: f64,
+    pub min_density: f64,
+    pub max_density: f64,
+    /// Particles behind a wall.
+    pub below_floor: u64,
+}
+
+/// What the totals need of the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Scales {
+    radial: bool,
+    floor: f64,
+    density: f64,
+}
+
+/// Share of the mass inside `front_mass`.
+const MASS_SHARE: f64 = 0.995;
+
+impl Scales {
+    /// From the scene: fronts are radii in the axisymmetric space and around a cylinder in 3-D.
+    pub fn new(scene: &Scene) -> Self {
+        let cylinder = scene.bodies.iter().any(|b| matches!(b.shape, Shape::Cylinder { .. }));
+        let floors = scene.walls.iter().filter(|w| w.axis == 2 && w.side > 0.0).map(|w| w.at);
+        Self {
+            radial: cylinder && scene.space == formats::space::Space::ThreeD,
+            floor: floors.reduce(f64::min).unwrap_or(0.0),
+            density: scene.material.density(),
+        }
+    }
+}
+
+impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
+    /// Totals of the present state. Collective.
+    pub fn totals(&self, scales: Scales) -> Line {
+        let (p, par) = (&self.particles, &self.parameters);
+        let place = |i: usize| P::Space::to_disk(p.x[i]);
+        let distance = |x: [f64; 3]| if scales.radial { (x[0] * x[0] + x[1] * x[1]).sqrt() } else { x[0] };
+
+        let mut extremes = [f64::NEG_INFINITY; 6];
+        for i in 0..p.owned {
+            let x = place(i);
+            let found = [p.v[i].norm2(), distance(x), x[2], p.density[i], -p.density[i], p.mass[i]];
+            for (extreme, found) in extremes.iter_mut().zip(found) {
+                *extreme = extreme.max(found);
+            }
+        }
+        self.comm.max(&mut extremes);
+        let [speed2, farthest, top, max_density, min_density, max_mass] = extremes;
+
+        let mass_bound = max_mass * par.count as f64;
+        let energy_bound = mass_bound * par.sound_speed * par.sound_speed;
+        let mut sums = [energy_bound, energy_bound, energy_bound, mass_bound / scales.density, mass_bound].map(Sum::new);
+        let mut below = [0u64];
+        for i in 0..p.owned {
+            let volume = p.mass[i] / p.density[i];
+            sums[0].add(0.5 * p.mass[i] * p.v[i].norm2());
+            sums[1].add(-p.mass[i] * self.gravity.dot(p.x[i]));
+            sums[2].add(volume * self.material.elastic_energy(p.stress[i]));
+            sums[3].add(volume);
+            sums[4].add(p.mass[i]);
+            below[0] += u64::from(self.walls.distance::<D, N, P::Space>(p.x[i]) < 0.0);
+        }
+        exact::reduce(self.comm, &mut sums);
+        self.comm.sum(&mut below);
+        let [kinetic, potential, elastic, volume, mass] = sums.map(|s| s.value());
+
+        let masses = (0..p.owned).map(|i| (distance(place(i)), p.mass[i]));
+        Line {
+            kinetic,
+            potential,
+            elastic,
+            max_speed: speed2.sqrt(),
+            front: farthest + 0.5 * par.spacing,
+            front_mass: self.quantile(masses, farthest, mass),
+            height: top + 0.5 * par.spacing - scales.floor,
+            volume_ratio: volume * scales.density / mass,
+            min_density: -min_density,
+            max_density,
+            below_floor: below[0],
+        }
+    }
+
+    /// Distance within which [`MASS_SHARE`] of the mass lies, from a histogram in whole numbers.
+    fn quantile(&self, masses: impl Iterator<Item = (f64, f64)>, farthest: f64, total: f64) -> f64 {
+        const BINS: usize = 8192;
+        const WHOLE: f64 = (1u64 << 52) as f64;
+        let width = (self.parameters.spacing / 8.0).max(farthest / (BINS - 1) as f64);
+        let mut bins = vec![0u64; BINS];
+        for (distance, mass) in masses {
+            bins[((distance / width).max(0.0) as usize).min(BINS - 1)] += (mass / total * WHOLE) as u64;
+        }
+        self.comm.sum(&mut bins);
+        let wanted = MASS_SHARE * bins.iter().sum::<u64>() as f64;
+        let mut inside = 0u64;
+        for (k, &bin) in bins.iter().enumerate() {
+            if (inside + bin) as f64 >= wanted {
+                let part = (wanted - inside as f64) / bin.max(1) as f64;
+                return (k as f64 + part) * width;
+            }
+            inside += bin;
+        }
+        farthest
+    }
+}
+
+impl Line {
+    /// The line as it stands in the file.
+    pub fn csv(&self, clock: &crate::simulation::Clock) -> String {
+        let e = |value: f64| format!("{value:e}");
+        let cells = [
+            e(clock.time),
+            clock.step.to_string(),
+            e(clock.time_step),
+            e(self.kinetic),
+            e(self.potential),
+            e(self.elastic),
+            e(self.max_speed),
+            e(self.front),
+            e(self.front_mass),
+            e(self.height),
+            e(self.volume_ratio),
+            e(self.min_density),
+            e(self.max_density),
+            self.below_floor.to_string(),
+        ];
+        cells.join(",") + "\n"
+    }
+}

@@ -1,0 +1,206 @@
+//! Everything one rank knows: its particles, what surrounds them, and where the run stands.
+
+use crate::algebra::{Matrix, Sym, Vector};
+use crate::boundary::mirror::{Image, Mirrors};
+use crate::boundary::wall::Walls;
+use crate::neighbors::{Neighbors, cell_order};
+use crate::parallel::halo::{Fields, Halo};
+use crate::parallel::migrate;
+use crate::parallel::orb::Tree;
+use crate::parallel::{Reduce, changed};
+use crate::particles::Particles;
+use crate::physics::Physics;
+use crate::space::Space;
+use crate::sweep::Pairs;
+use formats::h5::Communicator;
+use formats::scene::{Scene, WallLattice};
+
+/// Skin of the neighbour lists over the smoothing length: lists serve until a particle moved half of it.
+const SKIN: f64 = 0.2;
+
+/// Fixed numbers of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameters {
+    pub spacing: f64,
+    pub h: f64,
+    pub sound_speed: f64,
+    pub courant: f64,
+    pub damping: f64,
+    /// Skin of the neighbour lists, m.
+    pub skin: f64,
+    pub pairs: Pairs,
+    /// Number of all particles on all ranks.
+    pub count: u64,
+}
+
+/// Where the run stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Clock {
+    /// Time, s.
+    pub time: f64,
+    /// Steps done.
+    pub step: u64,
+    /// Length of the last step, s.
+    pub time_step: f64,
+    /// Largest kinetic energy so far, J.
+    pub peak_kinetic: f64,
+    /// Snapshots written.
+    pub snapshots: u64,
+    /// Lines of history written.
+    pub lines: u64,
+}
+
+/// How the particles are shared out.
+#[derive(Debug)]
+pub struct Partition {
+    pub tree: Tree,
+    pub halo: Halo,
+    /// Particles of this rank when they had gone home to a new tree; none until then.
+    planned: Option<u64>,
+    /// Trees built so far.
+    pub rebuilds: u64,
+}
+
+/// One rank's part of a run.
+pub struct Simulation<'a, const D: usize, const N: usize, P: Physics<D, N>> {
+    pub comm: &'a Communicator,
+    pub material: P::Material,
+    pub parameters: Parameters,
+    pub gravity: Vector<D>,
+    pub clock: Clock,
+    pub particles: Particles<D, N>,
+    pub neighbors: Neighbors,
+    pub partition: Partition,
+    pub mirrors: Mirrors,
+    pub images: Vec<Image>,
+    pub walls: Walls,
+    has_walls: bool,
+    /// Positions when the neighbour lists were built.
+    pub x_build: Vec<Vector<D>>,
+    pub gradient: Vec<Matrix<D>>,
+    pub weighted: Vec<Sym<N>>,
+    /// Share the particles out anew at every build of the lists: for tests.
+    pub always_rebalance: bool,
+}
+
+impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, P> {
+    /// Takes any share of the particles on each rank, sends them home and builds the lists. Collective.
+    pub fn new(
+        comm: &'a Communicator,
+        scene: &Scene,
+        material: P::Material,
+        particles: Particles<D, N>,
+        count: u64,
+        clock: Clock,
+    ) -> Self {
+        let (h, dx) = (scene.h(), scene.spacing);
+        let sound_speed = scene.material.sound_speed();
+        let viscosity = scene.numerics.viscosity * h * sound_speed * scene.material.density();
+        let axisymmetric = scene.space == formats::space::Space::Axisymmetric;
+        let axes = scene.space.axes();
+        let tree = Tree::build(particles.x.iter().map(|&x| P::Space::to_disk(x)), None, axes, comm);
+        let mut simulation = Self {
+            comm,
+            material,
+            parameters: Parameters {
+                spacing: dx,
+                h,
+                sound_speed,
+                courant: scene.numerics.courant,
+                damping: scene.numerics.damping,
+                skin: SKIN * h,
+                pairs: Pairs { h, spacing: dx, viscosity },
+                count,
+            },
+            gravity: P::Space::from_disk(scene.gravity),
+            clock,
+            particles,
+            neighbors: Neighbors::default(),
+            partition: Partition { tree, halo: Halo::default(), planned: None, rebuilds: 1 },
+            mirrors: Mirrors { planes: [scene.symmetry[0] || axisymmetric, scene.symmetry[1]] },
+            images: Vec::new(),
+            walls: Walls::new(WallLattice::new(scene), dx.powi(D as i32)),
+            has_walls: !scene.walls.is_empty(),
+            x_build: Vec::new(),
+            gradient: Vec::new(),
+            weighted: Vec::new(),
+            always_rebalance: false,
+        };
+        simulation.settle();
+        simulation.fill(Fields::Stress);
+        simulation
+    }
+
+    /// Shares the particles out anew if the load has shifted, sends them home, and builds halo, boundaries and lists.
+    pub fn rebuild(&mut self) {
+        let now = self.particles.owned as u64;
+        let mut shifted = [u64::from(self.always_rebalance || self.partition.planned.is_none_or(|then| changed(then, now)))];
+        self.comm.sum(&mut shifted);
+        if shifted[0] > 0 {
+            let owned = &self.particles.x[..self.particles.owned];
+            let axes: Vec<usize> = (0..3).filter(|&a| P::Space::axis(a).is_some()).collect();
+            self.partition.tree = Tree::build(owned.iter().map(|&x| P::Space::to_disk(x)), None, &axes, self.comm);
+            self.partition.rebuilds += 1;
+            self.partition.planned = None;
+        }
+        self.settle();
+    }
+
+    fn settle(&mut self) {
+        migrate::owners::<D, N, P::Space>(self.comm, &self.partition.tree, &mut self.particles);
+        let (h, skin) = (self.parameters.h, self.parameters.skin);
+        let reach = 2.0 * h + skin;
+        let order = cell_order(&self.particles.x, reach);
+        self.particles.arrange(&order);
+        self.partition.planned.get_or_insert(self.particles.owned as u64);
+        self.x_build.clone_from(&self.particles.x);
+        self.gradient.resize(self.particles.owned, Matrix::default());
+
+        // A particle near a wall is needed twice as far: by the wall particles that others see.
+        let beside_wall = if self.has_walls { 2.0 * reach } else { reach };
+        let walls = self.walls.clone();
+        let reach_of = |x: Vector<D>| {
+            if walls.distance::<D, N, P::Space>(x) < reach { beside_wall } else { reach }
+        };
+        self.refresh_volumes();
+        self.partition.halo = Halo::plan(self.comm, &mut self.particles, reach_of, beside_wall);
+        self.partition.halo.fill(self.comm, &mut self.particles, Fields::Motion);
+        self.images = self.mirrors.create::<D, N, P::Space>(&mut self.particles, reach_of);
+        Mirrors::fill_motion::<D, N, P::Space>(&mut self.particles, &self.images);
+        self.walls.create::<D, N, P::Space>(&mut self.particles, reach);
+        self.neighbors.build(&self.particles, reach);
+        self.walls.fill_motion::<D, N, P::Space, P::Kernel>(&mut self.particles, &self.neighbors, self.parameters.pairs);
+    }
+
+    /// Brings everything around the owned particles up to date, in the one order that is right: halo, then images of
+    /// owned and halo, then walls, which see all three.
+    pub fn fill(&mut self, fields: Fields) {
+        let p = &mut self.particles;
+        self.partition.halo.fill(self.comm, p, fields);
+        match fields {
+            Fields::Motion => {
+                Mirrors::fill_motion::<D, N, P::Space>(p, &self.images);
+                self.walls.fill_motion::<D, N, P::Space, P::Kernel>(p, &self.neighbors, self.parameters.pairs);
+            }
+            Fields::Stress => {
+                Mirrors::fill_stress::<D, N, P::Space>(p, &self.images);
+                self.walls.fill_stress::<D, N, P::Space>(p, &self.neighbors);
+            }
+        }
+    }
+
+    /// Volumes of the owned particles from mass, density and place.
+    pub fn refresh_volumes(&mut self) {
+        let p = &mut self.particles;
+        for i in 0..p.owned {
+            p.volume[i] = P::Space::volume(p.mass[i], p.density[i], p.x[i], self.parameters.spacing);
+        }
+    }
+
+    /// Ranks, largest owned count over the mean.
+    pub fn imbalance(&self) -> f64 {
+        let mut largest = [self.particles.owned as f64];
+        self.comm.max(&mut largest);
+        largest[0] * self.comm.size() as f64 / self.parameters.count.max(1) as f64
+    }
+}

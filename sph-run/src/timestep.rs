@@ -1,0 +1,110 @@
+//! The length of the next step, and the one reduction a step needs: it also carries every rank's health and every
+//! request, so that all ranks decide alike.
+
+use crate::error::Fault;
+use crate::parallel::comm::Reduce;
+use crate::physics::Physics;
+use crate::simulation::Simulation;
+
+/// Requests to all ranks, each either 0 or 1.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Requests {
+    /// Stop after a checkpoint.
+    pub stop: bool,
+    /// Write a checkpoint.
+    pub checkpoint: bool,
+}
+
+/// What the ranks agreed on.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    /// Length of the step, s.
+    pub time_step: f64,
+    /// Time after the step, s.
+    pub time: f64,
+    /// Will a particle have moved beyond what the neighbour lists allow?
+    pub lists_go_stale: bool,
+    pub requests: Requests,
+}
+
+/// Velocities beyond this many sound speeds are a fault.
+const RUNAWAY: f64 = 20.0;
+
+impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
+    /// Plans the step towards `event`, the next time at which something is due. Collective.
+    ///
+    /// dt = courant min(h/(c + |v|), sqrt(h/|a|)) over all particles (Yang et al. 2020, Eq 40, with the velocity and
+    /// the force criterion of Monaghan 1992), shortened to meet the event exactly.
+    pub fn plan(&self, event: f64, requests: Requests) -> Result<Plan, Fault> {
+        let (p, par) = (&self.particles, &self.parameters);
+        let mut largest = [0.0_f64; 6];
+        let [v2, a2, moved2, invalid, stop, checkpoint] = &mut largest;
+        for i in 0..p.owned {
+            let (v, a) = (p.v[i].norm2(), p.a[i].norm2());
+            if !(v + a + p.density[i] + p.stress[i].trace()).is_finite() {
+                *invalid = 1.0;
+            }
+            *v2 = v2.max(v);
+            *a2 = a2.max(a);
+            *moved2 = moved2.max((p.x[i] - self.x_build[i]).norm2());
+        }
+        *stop = f64::from(u8::from(requests.stop));
+        *checkpoint = f64::from(u8::from(requests.checkpoint));
+        self.comm.max(&mut largest);
+        let [v2, a2, moved2, invalid, stop, checkpoint] = largest;
+
+        let (v, a) = (v2.sqrt(), a2.sqrt());
+        if invalid > 0.0 {
+            return Err(Fault::NotFinite { step: self.clock.step });
+        }
+        if v > RUNAWAY * par.sound_speed {
+            return Err(Fault::Runaway { step: self.clock.step, speed: v, sound_speed: par.sound_speed });
+        }
+        let acoustic = par.h / (par.sound_speed + v);
+        let force = if a > 0.0 { (par.h / a).sqrt() } else { f64::INFINITY };
+        let dt = par.courant * acoustic.min(force);
+        if dt < 1e-6 * par.h / par.sound_speed {
+            return Err(Fault::TimeStepVanishes { step: self.clock.step, time_step: dt });
+        }
+        let (time_step, time) = meet(self.clock.time, dt, event);
+        // No particle goes further than |v| dt + |a| dt^2/2 before the lists are looked at again.
+        let travel = moved2.sqrt() + time_step * (v + 0.5 * a * time_step);
+        Ok(Plan {
+            time_step,
+            time,
+            lists_go_stale: travel > 0.5 * par.skin * (1.0 - 1e-9),
+            requests: Requests { stop: stop > 0.0, checkpoint: checkpoint > 0.0 },
+        })
+    }
+}
+
+/// Shortens a step so that some step ends exactly at `event`, without a tiny last one.
+fn meet(time: f64, dt: f64, event: f64) -> (f64, f64) {
+    let left = event - time;
+    if dt * (1.0 + 1e-9) >= left {
+        (left, event)
+    } else if 2.0 * dt > left {
+        (0.5 * left, time + 0.5 * left)
+    } else {
+        (dt, time + dt)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::meet;
+
+    #[test]
+    fn steps_meet_the_event_exactly_and_none_is_tiny() {
+        let (mut time, mut shortest) = (0.0, f64::INFINITY);
+        let mut steps = 0;
+        while time < 1.0 {
+            let (dt, next) = meet(time, 0.3, 1.0);
+            shortest = dt.min(shortest);
+            (time, steps) = (next, steps + 1);
+        }
+        assert_eq!(time, 1.0);
+        assert_eq!(steps, 4);
+        assert!(shortest > 0.15);
+    }
+}

@@ -1,0 +1,348 @@
+//! Wrong input, one case after the other: each must end all ranks with the documented exit code and one message that
+//! names the place, within a minute, and must leave what is on the disk as it was.
+
+use formats::{exit, folder::RunFolder};
+use std::{
+    collections::BTreeMap,
+    ffi::OsString,
+    fs,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+use tests::{Output, WorkFolder, command, prepared, run_within};
+
+/// Nothing here computes anything: what takes longer hangs.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Alone, and under mpirun.
+const RANKS: [usize; 2] = [0, 3];
+
+/// A sound scene, small and short.
+const SOUND: &str = r#"title = "sound"
+space = "plane-strain"
+spacing = "10 mm"
+[material.drucker-prager]
+density = "2600 kg/m3"
+young = "5.98 MPa"
+poisson = 0.3
+friction = "30 deg"
+cohesion = "0 Pa"
+[body.column]
+box = { min = [0, 0, 0], max = ["0.1 m", 0, "0.1 m"] }
+[wall.floor]
+axis = "z"
+at = "0 m"
+side = "above"
+slip = "no-slip"
+[end]
+time = "1 ms"
+"#;
+
+/// What is replaced in the sound scene, by what, and a word the message must have. The fault must be reported on a
+/// line of the replacement.
+const SCENES: &[(&str, &str, &str)] = &[
+    // Not TOML.
+    (r#"title = "sound""#, r#"title = "sound"#, "TOML"),
+    (r#"spacing = "10 mm""#, "spacing = 10 mm", "quotes"),
+    (r#"[end]"#, "[end", "TOML"),
+    ("poisson = 0.3", "poisson = 0.3\npoisson = 0.2", "duplicate"),
+    ("poisson = 0.3", "poisson = 0,3", "TOML"),
+    // Not a quantity.
+    (r#""10 mm""#, r#""10 apples""#, "apples"),
+    (r#""10 mm""#, r#""10 kg/m3""#, "length"),
+    (r#""10 mm""#, r#""ten mm""#, "length"),
+    (r#""10 mm""#, "nan", "spacing"),
+    (r#""10 mm""#, "inf", "spacing"),
+    (r#""10 mm""#, "1e999", "spacing"),
+    (r#""10 mm""#, "true", "length"),
+    ("poisson = 0.3", r#"poisson = "0.3 Pa""#, "unit"),
+    ("min = [0, 0, 0]", "min = [0, 0]", "min"),
+    ("box = {", "box = 3 # {", "box"),
+    // Out of range.
+    (r#""10 mm""#, "0", "greater than 0"),
+    (r#""10 mm""#, r#""-10 mm""#, "greater than 0"),
+    (r#""30 deg""#, r#""90 deg""#, "90"),
+    ("poisson = 0.3", "poisson = 0.5", "0.5"),
+    (r#""2600 kg/m3""#, r#""0 kg/m3""#, "greater than 0"),
+    (r#""0 Pa""#, r#""-1 Pa""#, "0 or greater"),
+    ("cohesion =", "dilation = \"31 deg\"\ncohesion =", "friction"),
+    (r#""1 ms""#, r#""0 s""#, "greater than 0"),
+    ("[end]", "[kernel]\nh-over-dx = 5\n[end]", "h-over-dx"),
+    ("[end]", "[initial]\njitter = 0.5\n[end]", "jitter"),
+    ("[end]", "[initial]\nseed = -1\n[end]", "seed"),
+    ("[end]", "[numerics]\ncourant = 0\n[end]", "courant"),
+    ("[end]", "[output]\nsnapshots = \"2 ms\"\n[end]", "end.time"),
+    // Unknown or missing.
+    ("spacing =", "spcing = 1\nspacing =", "spcing"),
+    (r#""plane-strain""#, r#""4d""#, "axisymmetric"),
+    ("[material.drucker-prager]", "[material.concrete]", "concrete"),
+    (r#""no-slip""#, r#""sticky""#, "free-slip"),
+    (r#"slip = "no-slip""#, "", "slip"),
+    ("[end]", "[wind]\nspeed = 1\n[end]", "wind"),
+    // What does not fit together.
+    (r#"title = "sound""#, r#"symmetry = ["y"]"#, "plane-strain"),
+    (r#"title = "sound""#, r#"gravity = [0, "1 m/s2", 0]"#, "gravity"),
+    (r#"axis = "z""#, r#"axis = "y""#, "normal to y"),
+    ("[end]", "[initial]\nk0 = 0.4\n[end]", "k0"),
+    ("[wall.floor]", "cylinder = { radius = 1, height = 1 }\n[wall.floor]", "shape"),
+    ("box = { min = [0, 0, 0]", "box = { min = [0, 0, -0.1]", "floor"),
+    ("[wall.floor]", "[body.twin]\nbox = { min = [0, 0, 0], max = [0.1, 0, 0.1] }\n[wall.floor]", "overlaps"),
+    (r#"max = ["0.1 m", 0, "0.1 m"]"#, r#"max = ["0.1 m", 0, "1 mm"]"#, "no particle"),
+    (r#"max = ["0.1 m", 0, "0.1 m"]"#, r#"max = ["100 km", 0, "0.1 m"]"#, "2^20"),
+    ("box = { min = [0, 0, 0], max =", "cylinder = { radius = 0.1, height = 0.1 } #", "cylinder"),
+    (
+        "[end]",
+        "[wall.lid]\naxis = \"z\"\nat = \"0.505 m\"\nside = \"below\"\nslip = \"no-slip\"\n[end]",
+        "whole number of spacings",
+    ),
+];
+
+/// Every file and folder below a folder, with its contents.
+fn contents(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![folder.to_owned()];
+    while let Some(place) = open.pop() {
+        for path in fs::read_dir(&place).unwrap().map(|entry| entry.unwrap().path()) {
+            let link = fs::symlink_metadata(&path).unwrap().is_symlink();
+            if path.is_dir() && !link {
+                open.push(path.clone());
+                found.insert(path, None);
+            } else {
+                let bytes = if link { Vec::new() } else { fs::read(&path).unwrap() };
+                found.insert(path, Some(bytes));
+            }
+        }
+    }
+    found
+}
+
+/// Runs a program on wrong input and checks everything but the place.
+#[track_caller]
+fn refused(work: &WorkFolder, program: &str, arguments: &[OsString], ranks: usize, code: i32) -> String {
+    let before = contents(work.path());
+    let output: Output = run_within(PATIENCE, command(program, arguments, ranks).current_dir(work.path()));
+    let said = format!("{program} {arguments:?} on {ranks} ranks: {output}");
+    assert!(!output.timed_out, "hangs: {said}");
+    assert_eq!(output.code, code, "{said}");
+    assert_eq!(output.stdout, "", "a failure has no result: {said}");
+    assert!(!output.stderr.contains("panicked"), "{said}");
+    let after = contents(work.path());
+    let names = |c: &BTreeMap<PathBuf, _>| c.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&before), names(&after), "{said}");
+    assert!(before == after, "a file has changed: {said}");
+    // mpirun adds a paragraph of its own between rules.
+    output.stderr.split("--------------------").next().unwrap_or_default().to_owned()
+}
+
+/// As [`refused`], on every number of ranks; the message must name `place` and say `word`, in one message only.
+#[track_caller]
+fn refused_at(work: &WorkFolder, program: &str, arguments: &[&str], code: i32, place: &str, word: &str) {
+    let arguments: Vec<OsString> = arguments.iter().map(OsString::from).collect();
+    for ranks in RANKS {
+        let said = refused(work, program, &arguments, ranks, code);
+        assert!(said.contains(place) && said.contains(word), "{program} {arguments:?}: no {place} or {word} in: {said}");
+        let lines: Vec<_> = said.lines().filter(|line| line.contains(place) && line.contains(word)).collect();
+        assert!(lines.len() <= 1, "said {} times: {said}", lines.len());
+    }
+}
+
+fn sound(work: &WorkFolder) {
+    work.write("scene.toml", SOUND);
+}
+
+#[test]
+fn a_sound_scene_is_taken() {
+    let work = WorkFolder::new();
+    prepared(&work, "run", SOUND, 1);
+}
+
+#[test]
+fn scenes_with_a_fault() {
+    for (old, new, word) in SCENES {
+        let work = WorkFolder::new();
+        assert_eq!(SOUND.matches(old).count(), 1, "{old} stands once in the sound scene");
+        let scene = SOUND.replace(old, new);
+        work.write("scene.toml", &scene);
+        let first = SOUND[..SOUND.find(old).unwrap()].lines().count().max(1);
+        for ranks in RANKS {
+            let arguments = ["scene.toml", "-o", "run"].map(OsString::from);
+            let said = refused(&work, "sph-prep", &arguments, ranks, exit::USAGE);
+            assert!(said.contains(word), "no {word} after {new}: {said}");
+            // A fault may be found at the section it lies in, or at the first line that makes no sense.
+            let lines = first.saturating_sub(6)..=first + new.lines().count() + 1;
+            let place = said.split("scene.toml:").nth(1).and_then(|rest| rest.split(':').next()?.parse::<usize>().ok());
+            assert!(place.is_some_and(|line| lines.contains(&line)), "not on lines {lines:?}: {new}: {said}");
+            for line in said.lines() {
+                assert_eq!(said.matches(line).count(), 1, "said more than once: {said}");
+            }
+        }
+    }
+}
+
+#[test]
+fn several_faults_are_told_at_once() {
+    let work = WorkFolder::new();
+    let scene = SOUND.replace("10 mm", "10 mmm").replace("30 deg", "300 deg").replace("no-slip", "noslip");
+    work.write("scene.toml", &scene);
+    for place in ["scene.toml:3:11: spacing: ", "scene.toml:8:12: material.", "scene.toml:16:8: wall.floor.slip: "] {
+        refused_at(&work, "sph-prep", &["scene.toml", "-o", "run"], exit::USAGE, place, "");
+    }
+}
+
+#[test]
+fn scenes_that_are_empty_or_lack_a_section() {
+    for missing in ["material", "body", "end", ""] {
+        let work = WorkFolder::new();
+        let sections = SOUND.split_inclusive("\n[").collect::<String>();
+        let kept = sections.split("\n[").filter(|section| !missing.is_empty() && !section.starts_with(missing));
+        let scene = kept.collect::<Vec<_>>().join("\n[");
+        work.write("scene.toml", &scene);
+        refused_at(&work, "sph-prep", &["scene.toml", "-o", "run"], exit::USAGE, "scene.toml:1:1: ", match missing {
+            "" => "space: ",
+            name => name,
+        });
+    }
+}
+
+#[test]
+fn scenes_that_are_no_text() {
+    let work = WorkFolder::new();
+    fs::write(work.join("latin1.toml"), b"title = \"B\xf6schung\"\n").unwrap();
+    fs::write(work.join("hdf.toml"), b"\x89HDF\r\n\x1a\n\0\0\0\0\xff\xff\xff\xff").unwrap();
+    fs::create_dir(work.join("folder.toml")).unwrap();
+    for name in ["latin1.toml", "hdf.toml", "folder.toml", "missing.toml", "latin1.toml/scene.toml"] {
+        refused_at(&work, "sph-prep", &[name, "-o", "run"], exit::NO_INPUT, name, "cannot read the scene");
+    }
+}
+
+#[test]
+fn command_lines_with_a_fault() {
+    let work = WorkFolder::new();
+    sound(&work);
+    let prep: &[&[&str]] = &[
+        &[],
+        &["scene.toml"],
+        &["-o", "run"],
+        &["scene.toml", "-o"],
+        &["scene.toml", "-o", ""],
+        &["scene.toml", "-o", "run", "--fast"],
+        &["scene.toml", "other.toml", "-o", "run"],
+    ];
+    for arguments in prep {
+        refused_at(&work, "sph-prep", arguments, exit::USAGE, "error: ", "");
+    }
+    refused_at(&work, "sph-prep", &["scene.toml"], exit::USAGE, "--output <RUN>", "");
+}
+
+#[test]
+fn run_folders_that_are_in_the_way() {
+    let work = WorkFolder::new();
+    sound(&work);
+    work.write("file", "mine");
+    fs::create_dir_all(work.join("full/deep")).unwrap();
+    fs::write(work.join("full/deep/scene.lock.toml"), "mine").unwrap();
+    std::os::unix::fs::symlink("nowhere", work.join("link")).unwrap();
+    let cases = [
+        ("file", "is a file"),
+        ("full", "not empty"),
+        ("link", "link to nowhere"),
+        ("file/run", "cannot write"),
+        // Not even root can make a folder there.
+        ("/proc/run", "cannot write"),
+        ("/proc/a/run", "cannot write"),
+        (".", "not empty"),
+    ];
+    for (target, word) in cases {
+        let place = target.split("/run").next().unwrap_or(target);
+        refused_at(&work, "sph-prep", &["scene.toml", "-o", target], exit::CANNOT_WRITE, place, word);
+    }
+}
+
+#[test]
+fn command_lines_of_the_run_with_a_fault() {
+    let work = WorkFolder::new();
+    prepared(&work, "run", SOUND, 1);
+    let cases: &[&[&str]] = &[
+        &[],
+        &["run", "--fast"],
+        &["run", "--stop-after-steps", "-3"],
+        &["run", "--stop-after-steps", "many"],
+        &["run", "--checkpoint-every", "0s"],
+        &["run", "--checkpoint-every", "5 parsecs"],
+    ];
+    for arguments in cases {
+        refused_at(&work, "sph-run", arguments, exit::USAGE, "error: ", "");
+    }
+}
+
+#[test]
+fn run_folders_that_cannot_be_run() {
+    let work = WorkFolder::new();
+    work.write("file", "mine");
+    fs::create_dir(work.join("empty")).unwrap();
+    for folder in ["missing", "empty", "file"] {
+        refused_at(&work, "sph-run", &[folder], exit::NO_INPUT, folder, "scene.lock.toml");
+    }
+}
+
+/// The lock is taken before the particles are looked at, so its file may stay: it is left out of the comparison.
+fn damaged(name: &str, damage: impl Fn(&RunFolder), code: i32, word: &str) {
+    let work = WorkFolder::new();
+    let folder = prepared(&work, "run", SOUND, 1);
+    damage(&folder);
+    for ranks in RANKS {
+        let before = contents(folder.path());
+        let output = run_within(PATIENCE, command("sph-run", &["run"], ranks).current_dir(work.path()));
+        let said = format!("{name} on {ranks} ranks: {output}");
+        assert!(!output.timed_out, "hangs: {said}");
+        assert_eq!(output.code, code, "{said}");
+        assert!(output.stderr.contains(word) && !output.stderr.contains("panicked"), "{said}");
+        let after = contents(folder.path());
+        for (path, bytes) in &before {
+            assert!(after.get(path) == Some(bytes) || *path == folder.lock(), "{} has changed: {said}", path.display());
+        }
+        assert!(!folder.done().exists(), "{said}");
+    }
+}
+
+#[test]
+fn particles_that_cannot_be_read() {
+    let initial = "initial.hdf";
+    damaged("missing", |f| fs::remove_file(f.initial()).unwrap(), exit::NO_INPUT, initial);
+    damaged("empty", |f| fs::write(f.initial(), "").unwrap(), exit::NO_INPUT, initial);
+    damaged("text", |f| fs::write(f.initial(), "particles").unwrap(), exit::NO_INPUT, initial);
+    let cut = |f: &RunFolder| {
+        let bytes = fs::read(f.initial()).unwrap();
+        fs::write(f.initial(), &bytes[..bytes.len() / 2]).unwrap();
+    };
+    damaged("cut off", cut, exit::NO_INPUT, initial);
+}
+
+#[test]
+fn scenes_changed_after_preparation() {
+    let edit = |from: &'static str, to: &'static str| {
+        move |f: &RunFolder| fs::write(f.scene(), SOUND.replace(from, to)).unwrap()
+    };
+    damaged("another scene", edit("30 deg", "31 deg"), exit::NO_INPUT, "scene");
+    damaged("a bad scene", edit("30 deg", "31 degrees"), exit::USAGE, "scene.lock.toml:8:");
+    damaged("no scene", |f| fs::remove_file(f.scene()).unwrap(), exit::NO_INPUT, "scene.lock.toml");
+}
+
+#[test]
+fn runs_that_cannot_be_evaluated() {
+    let work = WorkFolder::new();
+    let folder = prepared(&work, "run", SOUND, 1);
+    work.write("file", "mine");
+    let refuse = |name: &str, word: &str| {
+        let said = refused(&work, "sph-post", &[OsString::from(name)], 0, exit::NO_INPUT);
+        assert!(said.contains(word), "{said}");
+    };
+    refuse("missing", "missing");
+    refuse("file", "file");
+    refuse("run", "run");
+    fs::create_dir(folder.out()).unwrap();
+    fs::copy(folder.initial(), folder.snapshot(0)).unwrap();
+    let bytes = fs::read(folder.initial()).unwrap();
+    fs::write(folder.snapshot(1), &bytes[..bytes.len() / 2]).unwrap();
+    refuse("run", "snapshot-000001");
+}

@@ -1,0 +1,5 @@
+//! Tests of the programs as users run them, in one binary.
+
+mod bad_input;
+mod tidy;
+mod tools;

@@ -1,0 +1,95 @@
+//! Our files in other people's readers: VTK, PyVista, h5dump, ncdump, xarray and the checker of the CF conventions.
+
+use formats::exit;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tests::{WorkFolder, python, whole_run};
+
+const COLUMN: &str = r#"
+title = "Column for readers"
+space = "SPACE"
+spacing = "2 cm"
+
+[material.drucker-prager]
+density = "2600 kg/m3"
+young = "0.6 MPa"
+poisson = 0.3
+friction = "30 deg"
+cohesion = "0 Pa"
+
+[body.column]
+cylinder = { radius = "0.1 m", height = "0.1 m" }
+
+[wall.floor]
+axis = "z"
+at = "0 m"
+side = "above"
+slip = "no-slip"
+
+[end]
+time = "0.04 s"
+
+[output]
+snapshots = "10 ms"
+history = "2 ms"
+"#;
+
+fn scene(space: &str) -> String {
+    COLUMN.replace("SPACE", space)
+}
+
+/// The last snapshot of a run.
+fn last_snapshot(folder: &formats::folder::RunFolder) -> PathBuf {
+    let (name, _) = tests::digests(folder).pop().expect("a run leaves snapshots");
+    folder.out().join(name)
+}
+
+fn dump(tool: &str, file: &Path) -> Option<String> {
+    match Command::new(tool).arg("-h").arg(file).output() {
+        Err(_) => {
+            eprintln!("LEFT OUT: {tool} is not installed");
+            None
+        }
+        Ok(output) => {
+            assert!(output.status.success(), "{tool}: {}", String::from_utf8_lossy(&output.stderr));
+            Some(String::from_utf8_lossy(&output.stdout).into_owned())
+        }
+    }
+}
+
+#[test]
+fn snapshots_open_in_vtk_and_pyvista() {
+    let Some(interpreter) = python::interpreter() else { return };
+    let work = WorkFolder::new();
+    for space in ["axisymmetric", "3d"] {
+        let folder = whole_run(&work, space, &scene(space), 2);
+        python::script(&interpreter, "snapshot.py", &[&last_snapshot(&folder), &folder.series()]).expect(exit::DONE);
+        python::script(&interpreter, "snapshot.py", &[&folder.initial(), &folder.series()]).expect(exit::DONE);
+    }
+}
+
+#[test]
+fn results_open_in_xarray_and_pass_the_cf_checker() {
+    let Some(interpreter) = python::interpreter() else { return };
+    let work = WorkFolder::new();
+    for space in ["axisymmetric", "3d"] {
+        let folder = whole_run(&work, space, &scene(space), 2);
+        let results = folder.post().join("results.nc");
+        python::script(&interpreter, "results.py", &[&results]).expect(exit::DONE);
+        let mut checker = Command::new(interpreter.with_file_name("compliance-checker"));
+        checker.args(["--test=cf:1.11", "--criteria=strict"]).arg(&results);
+        tests::run_within(tests::TIME_LIMIT, &mut checker).expect(exit::DONE);
+    }
+}
+
+#[test]
+fn the_command_line_tools_of_hdf5_and_netcdf_read_them() {
+    let work = WorkFolder::new();
+    let folder = whole_run(&work, "run", &scene("axisymmetric"), 1);
+    if let Some(text) = dump("h5dump", &last_snapshot(&folder)) {
+        assert!(text.contains("VTKHDF") && text.contains("particles"), "{text}");
+    }
+    if let Some(text) = dump("ncdump", &folder.post().join("results.nc")) {
+        assert!(text.contains("t:units = \"s\"") && text.contains(":Conventions = \"CF-1.11\""), "{text}");
+    }
+}

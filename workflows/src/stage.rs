@@ -1,0 +1,237 @@
+//! The stages of a run, `sph-prep`, `sph-run`, `sph-post`: built once, then started one after the other.
+
+use crate::launch::{self, Stop};
+use crate::{failure::Failure, paths};
+use formats::{exit, folder::RunFolder, snapshot};
+use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
+use xshell::{Shell, cmd};
+
+/// The three programs, built in release.
+#[derive(Debug)]
+pub struct Programs {
+    shell: Shell,
+    folder: PathBuf,
+}
+
+/// What to run, and where.
+#[derive(Clone, Copy, Debug)]
+pub struct Job<'a> {
+    /// Scene file.
+    pub scene: &'a Path,
+    /// Run folder.
+    pub folder: &'a Path,
+    /// Ranks, if the user chose.
+    pub ranks: Option<u32>,
+    /// Remove what is there?
+    pub fresh: bool,
+    /// The command that goes on after a failure.
+    pub again: &'a str,
+}
+
+impl Programs {
+    /// Builds them next to this program: in `release/` of the target folder it was built in.
+    pub fn build() -> Result<Self, Failure> {
+        let shell = launch::shell()?;
+        let own = std::env::current_exe().map_err(|e| Failure::no_input(format!("cannot find this program: {e}")))?;
+        let target = own
+            .parent()
+            .and_then(Path::parent)
+            .ok_or_else(|| Failure::no_input(format!("{}: not in a target folder", own.display())))?;
+        let programs = Self { folder: target.join("release"), shell };
+        let built = ["sph-prep", "sph-run", "sph-post"].iter().all(|name| programs.path(name).is_file());
+        if !built {
+            eprintln!("talus: building sph-prep, sph-run and sph-post");
+        }
+        let quiet = built.then_some("--quiet");
+        let cargo = cargo();
+        let build = cmd!(
+            programs.shell,
+            "{cargo} build {quiet...} --release --target-dir {target} -p sph-prep -p sph-run -p sph-post"
+        );
+        let end = launch::wait(build, Stop::AtOnce)?;
+        match end.status.success() {
+            true => Ok(programs),
+            false => Err(Failure {
+                code: code(end.status),
+                message: "the programs could not be built, see above; go on with: ./talus and the same words".into(),
+            }),
+        }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+}
+
+/// The cargo that built this program, or the one on the path.
+pub fn cargo() -> PathBuf {
+    std::env::var_os("CARGO").map_or_else(|| "cargo".into(), PathBuf::from)
+}
+
+/// Runs the stages that are still to do: all of them in a new folder, the computation from its last checkpoint where
+/// it was stopped, and only `sph-post` where it is done.
+pub fn run(programs: &Programs, job: &Job) -> Result<(), Failure> {
+    let folder = RunFolder::new(job.folder);
+    if job.fresh {
+        remove(&folder)?;
+    }
+    if is_occupied(job.folder) {
+        same_scene(&folder, job)?;
+    } else {
+        prepare(programs, job)?;
+    }
+    let name = paths::short(job.folder).display().to_string();
+    if folder.done().is_file() {
+        eprintln!("talus: {name} is done: only the results are made again (--fresh starts over)");
+    } else {
+        let header = snapshot::read_header(&folder.initial()).map_err(|e| Failure {
+            code: e.exit_code(),
+            message: format!("{e}; start over with: {} --fresh", job.again),
+        })?;
+        let ranks = launch::ranks(job.ranks, header.count);
+        eprintln!("talus: sph-run on {ranks} rank{}, {} particles", if ranks == 1 { "" } else { "s" }, header.count);
+        let command = launch::parallel(&programs.shell, &programs.path("sph-run"), ranks).arg(job.folder);
+        passed("sph-run", launch::wait(command, Stop::Gently)?, job)?;
+    }
+    eprintln!("talus: sph-post");
+    let post = programs.path("sph-post");
+    let command = cmd!(programs.shell, "{post}").arg(job.folder);
+    passed("sph-post", launch::wait(command, Stop::AtOnce)?, job)
+}
+
+/// What a run leaves for people: the snapshots' index, the history, and everything in `post/`.
+pub fn results(folder: &Path) -> Vec<PathBuf> {
+    let folder = RunFolder::new(folder);
+    let mut made: Vec<PathBuf> =
+        std::fs::read_dir(folder.post()).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+    made.sort();
+    [folder.series(), folder.history()].into_iter().filter(|path| path.is_file()).chain(made).collect()
+}
+
+fn prepare(programs: &Programs, job: &Job) -> Result<(), Failure> {
+    if let Some(parent) = job.folder.parent() {
+        std::fs::create_dir_all(parent)
+            .map_err(|e| Failure::cannot_write(format!("{}: cannot make the folder: {e}", parent.display())))?;
+    }
+    eprintln!("talus: sph-prep {}", paths::short(job.scene).display());
+    let ranks = job.ranks.unwrap_or_else(launch::cores);
+    let command = launch::parallel(&programs.shell, &programs.path("sph-prep"), ranks);
+    let command = command.arg(job.scene).arg("-o").arg(job.folder);
+    passed("sph-prep", launch::wait(command, Stop::AtOnce)?, job)
+}
+
+fn is_occupied(folder: &Path) -> bool {
+    folder.exists() && std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_some())
+}
+
+/// A run folder is gone on with only if it was made from the same scene, to the byte.
+fn same_scene(folder: &RunFolder, job: &Job) -> Result<(), Failure> {
+    let name = paths::short(job.folder).display();
+    let (then, now) = (std::fs::read(folder.scene()), std::fs::read(job.scene));
+    let reason = match (then, now) {
+        (Ok(then), Ok(now)) if then == now && folder.initial().is_file() => return Ok(()),
+        (Ok(then), Ok(now)) if then == now => "holds a preparation that did not finish",
+        (Ok(_), Ok(_)) => "was made from another scene",
+        (Err(_), _) => "is not a run folder (it has no scene.lock.toml)",
+        (_, Err(_)) => "cannot be compared with the scene, which cannot be read",
+    };
+    let advice = match folder.scene().is_file() {
+        true => format!("start over with: {} --fresh; or choose another folder with --out", job.again),
+        false => "choose another folder with --out".to_owned(),
+    };
+    Err(Failure::cannot_write(format!("{name} {reason}; {advice}")))
+}
+
+/// Removes an earlier run, and nothing that doesn't look like one.
+fn remove(folder: &RunFolder) -> Result<(), Failure> {
+    if !is_occupied(folder.path()) {
+        return Ok(());
+    }
+    let name = paths::short(folder.path()).display();
+    if !folder.scene().is_file() {
+        return Err(Failure::cannot_write(format!(
+            "{name} is not a run folder (it has no scene.lock.toml): not removed"
+        )));
+    }
+    if folder.lock().exists() {
+        let message = format!("{name} is in use (its file LOCK is there): stop that run, or remove the file, first");
+        return Err(Failure { code: exit::LOCKED, message });
+    }
+    std::fs::remove_dir_all(folder.path())
+        .map_err(|e| Failure::cannot_write(format!("{name}: cannot remove the earlier run: {e}")))
+}
+
+/// Hands on the exit code of a stage that failed, with the command that goes on. mpirun answers SIGTERM with
+/// status 1 whatever its ranks say, so a stop on request is told by the request.
+fn passed(stage: &str, end: launch::End, job: &Job) -> Result<(), Failure> {
+    if end.status.success() {
+        return Ok(());
+    }
+    let code = if end.interrupted { exit::RESUMABLE } else { code(end.status) };
+    let what = match code {
+        exit::RESUMABLE => "stopped early".to_owned(),
+        code => format!("failed with exit code {code}, see above"),
+    };
+    Err(Failure { code, message: format!("{stage} {what}; go on with: {}", job.again) })
+}
+
+/// The exit code, or 128 plus the signal as shells count.
+pub fn code(status: ExitStatus) -> i32 {
+    use std::os::unix::process::ExitStatusExt;
+    status.code().or_else(|| status.signal().map(|signal| 128 + signal)).unwrap_or(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn job<'a>(scene: &'a Path, folder: &'a Path) -> Job<'a> {
+        Job { scene, folder, ranks: None, fresh: false, again: "./talus case x" }
+    }
+
+    #[test]
+    fn a_folder_of_another_scene_is_not_touched() {
+        let work = tempfile::tempdir().unwrap();
+        let (scene, folder) = (work.path().join("scene.toml"), work.path().join("run"));
+        std::fs::write(&scene, "spacing = 1").unwrap();
+        std::fs::create_dir(&folder).unwrap();
+        let run = RunFolder::new(&folder);
+        std::fs::write(folder.join("thesis.txt"), "years").unwrap();
+        let refused = |text: &str| {
+            let failure = same_scene(&run, &job(&scene, &folder)).unwrap_err();
+            assert_eq!(failure.code, exit::CANNOT_WRITE);
+            assert!(failure.message.contains(text), "{failure}");
+        };
+        refused("not a run folder");
+        assert_eq!(remove(&run).unwrap_err().code, exit::CANNOT_WRITE);
+        assert!(folder.join("thesis.txt").is_file());
+        std::fs::write(run.scene(), "spacing = 2").unwrap();
+        refused("another scene");
+        std::fs::write(run.scene(), "spacing = 1").unwrap();
+        refused("did not finish");
+        std::fs::write(run.initial(), "").unwrap();
+        same_scene(&run, &job(&scene, &folder)).unwrap();
+        std::fs::write(run.lock(), "").unwrap();
+        assert_eq!(remove(&run).unwrap_err().code, exit::LOCKED);
+        std::fs::remove_file(run.lock()).unwrap();
+        remove(&run).unwrap();
+        assert!(!folder.exists());
+    }
+
+    #[test]
+    fn the_code_of_a_stage_is_passed_on() {
+        let shell = launch::shell().unwrap();
+        let job = job(Path::new("s"), Path::new("r"));
+        let end = |script: &str| launch::wait(cmd!(shell, "sh -c {script}").quiet(), Stop::Gently).unwrap();
+        assert!(passed("sph-run", end("exit 0"), &job).is_ok());
+        let failure = passed("sph-run", end("exit 70"), &job).unwrap_err();
+        assert_eq!(failure.code, exit::NUMERICAL);
+        assert_eq!(failure.message, "sph-run failed with exit code 70, see above; go on with: ./talus case x");
+        let failure = passed("sph-run", end("exit 75"), &job).unwrap_err();
+        assert!(failure.code == exit::RESUMABLE && failure.message.contains("stopped early"), "{failure}");
+        assert_eq!(passed("sph-run", end("kill -9 $$"), &job).unwrap_err().code, 137);
+        let stopped = launch::End { interrupted: true, ..end("exit 1") };
+        assert_eq!(passed("sph-run", stopped, &job).unwrap_err().code, exit::RESUMABLE);
+    }
+}
