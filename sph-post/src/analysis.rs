@@ -157,7 +157,8 @@ fn files(folder: &RunFolder, hash: &str) -> Result<Vec<PathBuf>, Failure> {
             return Err(damaged("it has no particles".into()).into());
         }
         if header.time <= before {
-            let what = format!("its time, {} s, does not come after that of the snapshot before, {before} s", header.time);
+            let what =
+                format!("its time, {} s, does not come after that of the snapshot before, {before} s", header.time);
             return Err(damaged(what).into());
         }
         before = header.time;

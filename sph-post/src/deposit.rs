@@ -89,12 +89,13 @@ impl Deposit {
 
 /// Height of the surface over the floor at the horizontal position `at`, m; 0 where there is no material.
 ///
-/// The surface lies where the filled fraction (sum of V W, with the floor as a mirror) falls through half of what it
-/// is inside the column, looked for from the top of the contiguous stack of particles downward. The stack begins at
-/// the floor and ends below the first gap of more than 2h: what flies higher is ignored. Columns whose
-/// fraction stays below 1/2 hold no more than single particles and count as empty.
+/// The surface lies where the filled fraction (sum of V W, with the floor as a mirror) falls through 1/2, looked for
+/// from the top of the contiguous stack of particles downward. Beside a cliff, where the column is less than full, the
+/// fraction is taken relative to that inside the column. The stack begins at the floor and ends below the first gap of
+/// more than 2h: what flies higher is ignored. Columns less than half as full as a wide layer of
+/// their height hold no more than single particles and count as empty.
 pub fn surface(g: &Geometry, sampler: &Sampler, at: [f64; 2]) -> f64 {
-    let stack = sampler.stack([at[0], at[1], 0.0], 0.8 * g.dx);
+    let stack = sampler.stack([at[0], at[1], 0.0], g.h);
     let mut top = g.floor;
     for z in stack {
         if z - top > 2.0 * g.h {
@@ -111,10 +112,11 @@ pub fn surface(g: &Geometry, sampler: &Sampler, at: [f64; 2]) -> f64 {
     };
     let depths = [top - g.h, top - 2.0 * g.h, g.floor];
     let inside = depths.iter().map(|&z| fraction(z.max(g.floor))).fold(0.0, f64::max);
-    if inside < 0.5 {
+    let full = (inside / sampler.slab(top - g.floor + 0.5 * g.dx)).min(1.0);
+    if full < 0.5 {
         return 0.0;
     }
-    let wanted = 0.5 * inside.min(1.0);
+    let wanted = 0.5 * full;
     let (mut low, mut high) = (top + g.dx, top + 2.0 * g.dx);
     while fraction(low) < wanted {
         high = low;
@@ -225,10 +227,8 @@ impl Map {
     fn new(g: &Geometry, rows: &Rows, sampler: &Sampler) -> Self {
         let (mut first, mut size) = ([0; 2], [0; 2]);
         for a in 0..2 {
-            let (low, high) = rows
-                .position
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x[a]), h.max(x[a])));
+            let (low, high) =
+                rows.position.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x[a]), h.max(x[a])));
             (first[a], size[a]) = range(low, high, g.dx, MOST_BINS[1]);
             if g.mirrored[a] {
                 size[a] = (size[a] as i64 + first[a]).max(1) as usize;
@@ -254,7 +254,7 @@ impl Map {
     /// value (NaN) don't count, nor do those outside the map, unless they hold `zero_outside`. NaN where none counts.
     pub fn mean(&self, g: &Geometry, first: i64, count: usize, field: &[f64], zero_outside: bool) -> Vec<f64> {
         let mut sums = vec![0.0; count];
-        let mut seen = vec![0.0; count];
+        let mut seen = vec![0.0_f64; count];
         for (x, c) in self.cells(g) {
             let k = (g.along([x[0], x[1], 0.0]) / g.dx).floor() as i64 - first;
             let Some(k) = usize::try_from(k).ok().filter(|&k| k < count) else { continue };
@@ -266,7 +266,7 @@ impl Map {
         for (k, seen) in seen.iter_mut().enumerate() {
             let bin = first + k as i64;
             if zero_outside && (*seen == 0.0 || g.radial && self.leaves(g, bin)) {
-                *seen = seen.max(g.bin_area(bin) / (g.dx * g.dx));
+                *seen = (*seen).max(g.bin_area(bin) / (g.dx * g.dx));
             }
         }
         sums.iter().zip(&seen).map(|(sum, seen)| sum / seen).collect()
@@ -297,7 +297,8 @@ mod tests {
         for space in Space::ALL {
             for kernel in Kernel::ALL {
                 for layers in [1, 2, 3, 12] {
-                    let g = geometry(space, kernel, 0.01);
+                    let mut g = geometry(space, kernel, 0.01);
+                    g.width = if space == Space::ThreeD { 0.14 } else { 1.0 };
                     let rows = block(&g, [14, if space == Space::ThreeD { 14 } else { 1 }, layers]);
                     let d = deposit(&g, &rows);
                     let height = layers as f64 * g.dx;
@@ -364,7 +365,8 @@ mod tests {
                 let allowed = if x < 0.02 { 1.2 } else { 0.7 };
                 assert!((d.profile.height[k] - exact).abs() < allowed * g.dx, "{space:?} {x}: {}", d.profile.height[k]);
             }
-            let volume: f64 = d.profile.bins(&g).map(|(_, k)| d.profile.height[k] * g.bin_area(d.profile.first + k as i64)).sum();
+            let volume: f64 =
+                d.profile.bins(&g).map(|(_, k)| d.profile.height[k] * g.bin_area(d.profile.first + k as i64)).sum();
             let exact = match space {
                 Space::PlaneStrain => 0.5 * r * h,
                 Space::Axisymmetric => PI * r * r * h / 3.0,

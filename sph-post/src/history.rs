@@ -56,7 +56,10 @@ impl History {
         for (number, line) in lines {
             let cells: Vec<&str> = line.split(',').collect();
             if cells.len() != columns.len() {
-                return Err(damaged(number, format!("{} numbers where there are {} columns", cells.len(), columns.len())));
+                return Err(damaged(
+                    number,
+                    format!("{} numbers where there are {} columns", cells.len(), columns.len()),
+                ));
             }
             for (column, cell) in columns.iter_mut().zip(cells) {
                 let value = cell.trim().parse().map_err(|_| damaged(number, format!("`{cell}` is not a number")))?;

@@ -29,13 +29,22 @@ pub fn history(a: &Analysis, history: &History) -> Dataset {
     d.variable(time(history.times().to_vec()));
     for column in history.columns.iter().skip(1).filter(|c| is_name(&c.name)) {
         let long = column.name.replace('_', " ");
-        d.variable(Variable::new(&column.name, Role::Data, &["t"], &long, &cf_unit(&column.unit), column.values.clone()));
+        d.variable(Variable::new(
+            &column.name,
+            Role::Data,
+            &["t"],
+            &long,
+            &cf_unit(&column.unit),
+            column.values.clone(),
+        ));
     }
     d
 }
 
 fn is_name(name: &str) -> bool {
-    name != "t" && name.starts_with(|c: char| c.is_ascii_alphabetic()) && !name.contains(|c: char| !c.is_ascii_alphanumeric() && c != '_')
+    name != "t"
+        && name.starts_with(|c: char| c.is_ascii_alphabetic())
+        && !name.contains(|c: char| !c.is_ascii_alphanumeric() && c != '_')
 }
 
 /// Units as CF writes them: `kg/m3` is `kg m-3`.
@@ -145,23 +154,32 @@ fn profiles(a: &Analysis, d: &mut Dataset) {
     d.dimension("bnds", 2);
     let long = if name == "r" { "distance from the axis" } else { "horizontal position" };
     coordinate(a, d, name, long, first, count);
-    let mut add = |variable: &str, long: &str, unit: &str, method: &str, outside: f64, field: &dyn Fn(&Moment) -> &[f64]| {
-        let mut values = Vec::with_capacity(a.moments.len() * count);
-        for m in &a.moments {
-            let skip = (m.deposit.profile.first - first) as usize;
-            let row = field(m);
-            values.extend((0..count).map(|k| k.checked_sub(skip).and_then(|k| row.get(k)).copied().unwrap_or(outside)));
-        }
-        let v = Variable::new(variable, Role::Data, &["t", name], long, unit, values);
-        d.variable(v.with("cell_methods", format!("{name}: {method}")));
-    };
+    let mut add =
+        |variable: &str, long: &str, unit: &str, method: &str, outside: f64, field: &dyn Fn(&Moment) -> &[f64]| {
+            let mut values = Vec::with_capacity(a.moments.len() * count);
+            for m in &a.moments {
+                let skip = (m.deposit.profile.first - first) as usize;
+                let row = field(m);
+                values.extend(
+                    (0..count).map(|k| k.checked_sub(skip).and_then(|k| row.get(k)).copied().unwrap_or(outside)),
+                );
+            }
+            let v = Variable::new(variable, Role::Data, &["t", name], long, unit, values);
+            d.variable(v.with("cell_methods", format!("{name}: {method}")));
+        };
     let three = a.geometry.space.dimension() == 3;
     let method = if three { "mean" } else { "point" };
     add("height", "height of the surface above the floor", "m", method, 0.0, &|m| &m.deposit.profile.height);
     add("thickness", "volume of material over area", "m", "mean", 0.0, &|m| &m.deposit.profile.thickness);
-    let shear = if name == "r" { "shear stress sigma_rz at the basal height" } else { "shear stress sigma_xz at the basal height" };
+    let shear = if name == "r" {
+        "shear stress sigma_rz at the basal height"
+    } else {
+        "shear stress sigma_xz at the basal height"
+    };
     let none = f64::NAN;
-    add("basal_normal_stress", "normal stress sigma_zz at the basal height", "Pa", method, none, &|m| &m.basal.profile.normal);
+    add("basal_normal_stress", "normal stress sigma_zz at the basal height", "Pa", method, none, &|m| {
+        &m.basal.profile.normal
+    });
     add("basal_shear_stress", shear, "Pa", method, none, &|m| &m.basal.profile.shear);
     let hydrostatic = "weight of the column above the basal height over its area, as a normal stress";
     add("hydrostatic_stress", hydrostatic, "Pa", method, none, &|m| &m.basal.profile.hydrostatic);
@@ -207,7 +225,9 @@ mod tests {
 
     #[test]
     fn units_are_spelt_as_cf_wants() {
-        for (ours, cf) in [("m/s", "m s-1"), ("kg/m3", "kg m-3"), ("1", "1"), ("1/s", "s-1"), ("J", "J"), ("m/s2", "m s-2")] {
+        for (ours, cf) in
+            [("m/s", "m s-1"), ("kg/m3", "kg m-3"), ("1", "1"), ("1/s", "s-1"), ("J", "J"), ("m/s2", "m s-2")]
+        {
             assert_eq!(cf_unit(ours), cf);
         }
     }

@@ -8,7 +8,7 @@ pub fn table(a: &Analysis) -> String {
     let (g, last) = (&a.geometry, a.last());
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
-        let _ = writeln!(text, "  {name:<34}{value}");
+        let _ = writeln!(text, "  {name:<36}{value}");
     };
     let scaled = |v: f64| if v.is_nan() { String::new() } else { format!("   ({v:.3} r0)") };
     let front = |v: f64| format!("{v:.5} m{}", scaled(a.scaled(v)));
@@ -23,7 +23,7 @@ pub fn table(a: &Analysis) -> String {
     line("height anywhere", length(last.deposit.height_max));
     line("volume / volume at the start", format!("{:.4}", last.deposit.volume_ratio));
     let carried = if last.basal.weight == 0.0 { "none above".into() } else { format!("{:.4}", last.basal.ratio()) };
-    line(&format!("force / weight {:.4} m above floor", a.level), carried);
+    line(&format!("force / weight at {:.4} m", a.level), carried);
     text.insert_str(0, &format!("{}\n", a.scene.title));
     if a.moments.iter().any(|m| m.deposit.volume_ratio > 1.1) {
         text.push_str("  note: the material swelled by more than 10 %; see `volume_ratio` in results.nc\n");

@@ -27,6 +27,9 @@ pub struct Sampler {
     /// Sorted by column, then by z.
     points: Vec<Point>,
     columns: HashMap<[i32; 2], (u32, u32)>,
+    /// See [`Sampler::slab`].
+    slabs: Vec<f64>,
+    dx: f64,
 }
 
 /// Weights of the rows around a point. Their sum is one.
@@ -59,7 +62,17 @@ impl Sampler {
             columns.entry(column(p)).or_insert((i as u32, i as u32)).1 = i as u32 + 1;
         }
         let (kernel, h, dimension) = (geometry.kernel, geometry.h, geometry.space.dimension());
-        Self { kernel, h, dimension, points, columns }
+        let slabs = slabs(geometry);
+        Self { kernel, h, dimension, points, columns, slabs, dx: geometry.dx }
+    }
+
+    /// The filled fraction on a floor under a wide slab of this thickness (m), the floor being a mirror: below 1 where
+    /// the slab is thinner than the kernel's reach.
+    pub fn slab(&self, thickness: f64) -> f64 {
+        let layers = (thickness / self.dx).clamp(0.0, (self.slabs.len() - 1) as f64);
+        let k = (layers as usize).min(self.slabs.len() - 2);
+        let part = layers - k as f64;
+        self.slabs[k] * (1.0 - part) + self.slabs[k + 1] * part
     }
 
     /// Calls `visit` with every point closer than 2h to `at`, and its distance over h.
@@ -144,6 +157,27 @@ impl Sampler {
         }
         Some(Stencil { rows })
     }
+}
+
+/// Filled fractions on the floor under 0, 1, 2 .. lattice layers, up to the kernel's reach.
+fn slabs(g: &Geometry) -> Vec<f64> {
+    let (dimension, ratio) = (g.space.dimension(), g.h / g.dx);
+    let most = (2.0 * ratio).ceil() as i32 + 1;
+    let across = if dimension == 3 { -most..=most } else { 0..=0 };
+    let norm = g.kernel.norm(dimension) / ratio.powi(dimension as i32);
+    let mut sums = vec![0.0];
+    for layer in 0..most {
+        let z = f64::from(layer) + 0.5;
+        let mut sum = sums[layer as usize];
+        for i in -most..=most {
+            for j in across.clone() {
+                let r = (f64::from(i * i + j * j) + z * z).sqrt();
+                sum += 2.0 * norm * g.kernel.shape(r / ratio);
+            }
+        }
+        sums.push(sum);
+    }
+    sums
 }
 
 /// Smallest pivot of the spread of the particles around a point, in h2, that allows a linear fit. Inside a lattice

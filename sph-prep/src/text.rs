@@ -22,7 +22,10 @@ pub fn broadcast(mut bytes: Vec<u8>, comm: &impl Communicator) -> Vec<u8> {
     let mut length = bytes.len() as u64;
     root.broadcast_into(&mut length);
     bytes.resize(length as usize, 0);
-    root.broadcast_into(&mut bytes[..]);
+    // MPI refuses the address of an empty buffer.
+    if length > 0 {
+        root.broadcast_into(&mut bytes[..]);
+    }
     bytes
 }
 

@@ -16,6 +16,8 @@ pub struct Start {
     pub clock: Clock,
     /// Length of the history that belongs to the checkpoint, bytes.
     pub history_length: u64,
+    /// Had the run reached its end? Then it was killed before it was marked as done.
+    pub over: bool,
 }
 
 impl Start {
@@ -23,7 +25,7 @@ impl Start {
     pub fn find(folder: &RunFolder, quiet: bool) -> Result<Self, RunError> {
         let Some(checkpoint::Found { manifest, state, warnings }) = checkpoint::latest(folder)? else {
             let particles = folder.initial();
-            return Ok(Self { particles, clock: Clock::default(), history_length: 0 });
+            return Ok(Self { particles, clock: Clock::default(), history_length: 0, over: false });
         };
         for warning in warnings {
             eprintln!("sph-run: warning: {warning}; an older checkpoint is used");
@@ -34,7 +36,8 @@ impl Start {
             eprintln!("sph-run: resuming at t = {:.4} s, step {}", clock.time, clock.step);
         }
         let history_length = manifest.outputs.get("out/history.csv").copied().unwrap_or(0);
-        Ok(Self { particles: state, clock, history_length })
+        let over = manifest.clock["over"].as_bool().unwrap_or(false);
+        Ok(Self { particles: state, clock, history_length, over })
     }
 
     /// Does the run start at its beginning?
@@ -47,7 +50,7 @@ impl Start {
         serde_json::json!({
             "particles": self.particles,
             "step": self.clock.step,
-            "clock": clock_to_json(&self.clock),
+            "clock": clock_to_json(&self.clock, self.over),
             "history_length": self.history_length,
         })
     }
@@ -58,18 +61,21 @@ impl Start {
             particles: PathBuf::from(value["particles"].as_str()?),
             clock: clock_from_json(&value["clock"], value["step"].as_u64()?)?,
             history_length: value["history_length"].as_u64()?,
+            over: value["clock"]["over"].as_bool()?,
         })
     }
 }
 
-/// The clock in a manifest. Floats are stored as their bits: decimal text would be a second truth.
-pub fn clock_to_json(clock: &Clock) -> serde_json::Value {
+/// The clock in a manifest, and whether the run is over. Floats are stored as their bits: decimal text would be a
+/// second truth.
+pub fn clock_to_json(clock: &Clock, over: bool) -> serde_json::Value {
     serde_json::json!({
         "time_bits": clock.time.to_bits(),
         "time_step_bits": clock.time_step.to_bits(),
         "peak_kinetic_bits": clock.peak_kinetic.to_bits(),
         "snapshots": clock.snapshots,
         "lines": clock.lines,
+        "over": over,
     })
 }
 

@@ -13,7 +13,7 @@ use crate::report::Scales;
 use crate::resume::{Files, Start};
 use crate::simulation::Simulation;
 use formats::folder::RunFolder;
-use formats::h5::Communicator;
+use formats::h5::{self, Communicator};
 use formats::scene::Scene;
 use formats::schema::Kept;
 use formats::{checkpoint, snapshot};
@@ -44,7 +44,16 @@ impl Job for Run<'_> {
     type Output = Result<Outcome, RunError>;
 
     fn run<const D: usize, const N: usize, P: Physics<D, N>>(self, material: P::Material) -> Self::Output {
-        let count = snapshot::read_header(&self.start.particles)?.count;
+        // Every rank reads for itself; a file that only one of them can't read must still end them all.
+        let header = h5::agree(self.comm, snapshot::read_header(&self.start.particles))?;
+        if header.scene_hash != self.scene_hash {
+            let message = format!(
+                "belongs to another scene than {}\nhelp: prepare the changed scene into a new folder with sph-prep",
+                self.folder.scene().display()
+            );
+            return Err(RunError::Input { path: self.start.particles, message });
+        }
+        let count = header.count;
         let (rank, size) = (self.comm.rank() as u64, self.comm.size() as u64);
         let (_, rows) = snapshot::read_rows(&self.start.particles, snapshot::share(count, rank, size), self.comm)?;
         let particles = Particles::from_rows::<P::Space>(&rows);
@@ -77,6 +86,9 @@ struct Course<'a, const D: usize, const N: usize, P: Physics<D, N>> {
 impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
     fn follow(mut self) -> Result<Outcome, RunError> {
         let first = self.simulation.clock.step;
+        if self.job.start.over {
+            return self.finish();
+        }
         let mut over = self.outputs_due()?;
         while !over {
             if self.job.cli.stop_after_steps.is_some_and(|n| self.simulation.clock.step >= first + n) {
@@ -85,19 +97,24 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             let requests = self.requests();
             let plan = match self.simulation.plan(self.next_event(), requests) {
                 Ok(plan) => plan,
-                Err(fault) => return Err(self.keep_for_diagnosis(fault)?),
+                Err(fault) => return Err(self.keep_for_diagnosis(fault)),
             };
             if plan.requests.stop {
                 return self.stop();
             }
             if plan.requests.checkpoint {
-                self.checkpoint()?;
+                self.checkpoint(false)?;
             }
             self.simulation.step(&plan);
             over = self.outputs_due()?;
             self.progress.tell(&self.simulation.clock);
         }
-        self.checkpoint()?;
+        self.checkpoint(true)?;
+        self.finish()
+    }
+
+    /// Marks the run as done.
+    fn finish(&self) -> Result<Outcome, RunError> {
         self.progress.finish();
         let (folder, comm) = (self.job.folder, self.job.comm);
         agree(comm, || output::replace(&folder.done(), "the run reached its end\n"))?;
@@ -118,8 +135,13 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         // Two events that differ by rounding only are one.
         let due = |event: f64, interval: f64| clock.time + 1e-9 * interval >= event;
         let mut over = due(scene.end.time, scene.output.history);
+        let line_due = over || due(clock.lines as f64 * scene.output.history, scene.output.history);
+        let snapshot_due = over || due(clock.snapshots as f64 * scene.output.snapshots, scene.output.snapshots);
+        if line_due || snapshot_due {
+            self.check_finite()?;
+        }
         let mut at_rest = false;
-        if over || due(clock.lines as f64 * scene.output.history, scene.output.history) {
+        if line_due {
             let line = self.simulation.totals(self.scales);
             let peak = clock.peak_kinetic.max(line.kinetic);
             at_rest = scene.end.at_rest.is_some_and(|fraction| line.kinetic < fraction * peak);
@@ -130,10 +152,25 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             agree(self.job.comm, || files.as_mut().map_or(Ok(()), |f| f.history.append(&text)))?;
         }
         over |= at_rest;
-        if over || due(clock.snapshots as f64 * scene.output.snapshots, scene.output.snapshots) {
+        if over || snapshot_due {
             self.snapshot()?;
         }
         Ok(over)
+    }
+
+    /// The planning of the next step would find a fault; but nothing faulty is written before that. Collective.
+    fn check_finite(&mut self) -> Result<(), RunError> {
+        let p = &self.simulation.particles;
+        let finite = |i: usize| {
+            let vectors = [p.x[i].0, p.v[i].0, p.a[i].0];
+            p.density[i].is_finite() && vectors.iter().flatten().chain(&p.stress[i].0).all(|f| f.is_finite())
+        };
+        let mut faulty = [u64::from(!(0..p.owned).all(finite))];
+        self.job.comm.sum(&mut faulty);
+        if faulty[0] > 0 {
+            return Err(self.keep_for_diagnosis(Fault::NotFinite { step: self.simulation.clock.step }));
+        }
+        Ok(())
     }
 
     fn snapshot(&mut self) -> Result<(), RunError> {
@@ -165,7 +202,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         crate::timestep::Requests { stop: self.job.limits.stop(root), checkpoint }
     }
 
-    fn checkpoint(&mut self) -> Result<(), RunError> {
+    /// Writes a checkpoint; `over`: of a run that has reached its end. Collective.
+    fn checkpoint(&mut self, over: bool) -> Result<(), RunError> {
         let folder = self.job.folder;
         let files = &mut self.files;
         let length = agree(self.job.comm, || files.as_mut().map_or(Ok(0), |f| f.history.commit()))?.unwrap_or(0);
@@ -176,7 +214,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             folder,
             &header,
             &rows,
-            &crate::resume::clock_to_json(&self.simulation.clock),
+            &crate::resume::clock_to_json(&self.simulation.clock, over),
             &outputs,
             self.job.cli.checkpoint_keep as usize,
             self.job.comm,
@@ -186,7 +224,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
     }
 
     fn stop(mut self) -> Result<Outcome, RunError> {
-        self.checkpoint()?;
+        self.check_finite()?;
+        self.checkpoint(false)?;
         self.progress.finish();
         let folder = self.job.folder;
         // The request is honoured once.
@@ -197,13 +236,23 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         Ok(Outcome::Stopped)
     }
 
-    /// Writes the faulty state aside, not as a checkpoint: the last good one stays.
-    fn keep_for_diagnosis(&mut self, fault: Fault) -> Result<RunError, RunError> {
+    /// Writes the faulty state aside, not as a checkpoint: the last good one stays. Files hold finite numbers only; in
+    /// this one the largest there is stands for the others. Collective.
+    fn keep_for_diagnosis(&mut self, fault: Fault) -> RunError {
         self.progress.finish();
         let state = self.job.folder.out().join("fault.hdf");
         let header = self.simulation.header(self.job.scene, &self.job.scene_hash);
-        self.simulation.write_snapshot(&state, &header, Kept::Checkpoint)?;
-        Ok(RunError::Numerical { fault, state })
+        let mut rows = self.simulation.rows();
+        let reals = [&mut rows.position, &mut rows.velocity, &mut rows.acceleration].into_iter().flatten().flatten();
+        for real in reals.chain(rows.stress.iter_mut().flatten()).chain(&mut rows.density).chain(&mut rows.plastic_strain) {
+            if !real.is_finite() {
+                *real = f64::MAX;
+            }
+        }
+        let written = snapshot::write(&state, &header, &rows, Kept::Checkpoint, self.job.comm);
+        if let (Err(error), 0) = (written, self.job.comm.rank()) {
+            eprintln!("sph-run: warning: the faulty state could not be kept: {error}");
+        }
+        RunError::Numerical { fault, state }
     }
 }
-

@@ -1,7 +1,7 @@
 //! Wrong input, one case after the other: each must end all ranks with the documented exit code and one message that
 //! names the place, within a minute, and must leave what is on the disk as it was.
 
-use formats::{exit, folder::RunFolder};
+use formats::{exit, folder::RunFolder, lock::RunLock};
 use std::{
     collections::BTreeMap,
     ffi::OsString,
@@ -140,7 +140,10 @@ fn refused_at(work: &WorkFolder, program: &str, arguments: &[&str], code: i32, p
     let arguments: Vec<OsString> = arguments.iter().map(OsString::from).collect();
     for ranks in RANKS {
         let said = refused(work, program, &arguments, ranks, code);
-        assert!(said.contains(place) && said.contains(word), "{program} {arguments:?}: no {place} or {word} in: {said}");
+        assert!(
+            said.contains(place) && said.contains(word),
+            "{program} {arguments:?}: no {place} or {word} in: {said}"
+        );
         let lines: Vec<_> = said.lines().filter(|line| line.contains(place) && line.contains(word)).collect();
         assert!(lines.len() <= 1, "said {} times: {said}", lines.len());
     }
@@ -193,14 +196,20 @@ fn several_faults_are_told_at_once() {
 fn scenes_that_are_empty_or_lack_a_section() {
     for missing in ["material", "body", "end", ""] {
         let work = WorkFolder::new();
-        let sections = SOUND.split_inclusive("\n[").collect::<String>();
-        let kept = sections.split("\n[").filter(|section| !missing.is_empty() && !section.starts_with(missing));
+        let kept = SOUND.split("\n[").filter(|section| !missing.is_empty() && !section.starts_with(missing));
         let scene = kept.collect::<Vec<_>>().join("\n[");
         work.write("scene.toml", &scene);
-        refused_at(&work, "sph-prep", &["scene.toml", "-o", "run"], exit::USAGE, "scene.toml:1:1: ", match missing {
-            "" => "space: ",
-            name => name,
-        });
+        refused_at(
+            &work,
+            "sph-prep",
+            &["scene.toml", "-o", "run"],
+            exit::USAGE,
+            "scene.toml:1:1: ",
+            match missing {
+                "" => "space: ",
+                name => name,
+            },
+        );
     }
 }
 
@@ -231,7 +240,7 @@ fn command_lines_with_a_fault() {
     for arguments in prep {
         refused_at(&work, "sph-prep", arguments, exit::USAGE, "error: ", "");
     }
-    refused_at(&work, "sph-prep", &["scene.toml"], exit::USAGE, "--output <RUN>", "");
+    refused_at(&work, "sph-prep", &["scene.toml"], exit::USAGE, "  --output <RUN>", "");
 }
 
 #[test]
@@ -326,6 +335,22 @@ fn scenes_changed_after_preparation() {
     damaged("another scene", edit("30 deg", "31 deg"), exit::NO_INPUT, "scene");
     damaged("a bad scene", edit("30 deg", "31 degrees"), exit::USAGE, "scene.lock.toml:8:");
     damaged("no scene", |f| fs::remove_file(f.scene()).unwrap(), exit::NO_INPUT, "scene.lock.toml");
+}
+
+#[test]
+fn runs_that_another_process_holds_or_has_begun() {
+    let work = WorkFolder::new();
+    let folder = prepared(&work, "run", SOUND, 1);
+    let held = RunLock::acquire(&folder.lock()).unwrap();
+    refused_at(&work, "sph-run", &["run"], exit::LOCKED, "run", "LOCK");
+    drop(held);
+    run_within(PATIENCE, command("sph-run", &["run", "--stop-after-steps", "3"], 1).current_dir(work.path()))
+        .expect(exit::RESUMABLE);
+    let arguments = ["run", "--new"].map(OsString::from);
+    for ranks in RANKS {
+        let said = refused(&work, "sph-run", &arguments, ranks, exit::USAGE);
+        assert!(said.contains("run") && said.contains("begun"), "{said}");
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Tests of the programs as users run them, in one binary.
 
 mod bad_input;
+mod same_bits;
 mod tidy;
 mod tools;

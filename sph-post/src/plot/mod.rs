@@ -1,1 +1,92 @@
-use crate::{analysis::Analysis,failure::Failure};use std::path::*;pub fn pictures(_:&Analysis,_:&Path)->Result<Vec<PathBuf>,Failure>{Ok(vec![])}
+//! Pictures: SVG and PNG of the same drawing, side by side in `post/`.
+
+mod basal;
+mod canvas;
+mod particles;
+mod profiles;
+mod series;
+mod top_view;
+
+use crate::{analysis::Analysis, failure::Failure};
+use std::path::{Path, PathBuf};
+
+/// Draws everything the run has to show, and returns the paths.
+///
+/// # Errors
+/// Where a picture can't be written.
+pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let mut paths = Vec::new();
+    for draw in [profiles::draw, series::draw, particles::draw, top_view::draw, basal::draw] {
+        paths.extend(draw(analysis, folder)?);
+    }
+    Ok(paths)
+}
+
+/// How lengths are shown: over r0 where there is one, else in m.
+struct Lengths {
+    /// m.
+    unit: f64,
+    /// What stands behind the name of an axis: `/ r0`, `(m)`.
+    text: String,
+}
+
+impl Lengths {
+    fn of(analysis: &Analysis) -> Self {
+        match analysis.geometry.r0() {
+            // r0 stands for the radius, L0 for the length of a body that is none.
+            Some(r0) if analysis.geometry.radial => Self { unit: r0, text: "/ r\u{2080}".into() },
+            Some(r0) => Self { unit: r0, text: "/ L\u{2080}".into() },
+            None => Self { unit: 1.0, text: "(m)".into() },
+        }
+    }
+
+    /// `r0 = 0.1 m`, for titles; nothing where lengths are in m.
+    fn explained(&self) -> String {
+        match self.text.strip_prefix("/ ") {
+            Some(name) => format!("{name} = {} m", canvas::number(self.unit)),
+            None => String::new(),
+        }
+    }
+}
+
+/// How times are shown: over T = sqrt(H0/g) where there is one, else in s.
+struct Times {
+    /// s.
+    unit: f64,
+    /// Name of the axis.
+    text: String,
+    /// `T = 0.1 s`, or nothing.
+    explained: String,
+}
+
+impl Times {
+    fn of(analysis: &Analysis) -> Self {
+        match analysis.geometry.time_scale() {
+            Some(unit) => {
+                let explained = format!("T = \u{221a}(H\u{2080}/g) = {} s", canvas::number((unit * 1e5).round() / 1e5));
+                Self { unit, text: "t / T".into(), explained }
+            }
+            None => Self { unit: 1.0, text: "t (s)".into(), explained: String::new() },
+        }
+    }
+}
+
+/// Title of a picture: the scene's, cut where it is too long, and what the picture shows.
+fn title(analysis: &Analysis, what: &str) -> String {
+    let title = &analysis.scene.title;
+    let short: String = title.chars().take(60).collect();
+    let dots = if title.chars().count() > 60 { "\u{2026}" } else { "" };
+    if title.is_empty() { what.into() } else { format!("{short}{dots}: {what}") }
+}
+
+/// Final run-out (r - r0)/r0 and, where it is known, height h/r0 of a cylinder of grains of aspect ratio
+/// `a` = H0/r0 on a plane (Lube, Huppert, Sparks & Hallworth 2004, J. Fluid Mech. 508, 175-199).
+fn lube(a: f64) -> (f64, Option<f64>) {
+    let run_out = if a < 1.7 { 1.24 * a } else { 1.6 * a.sqrt() };
+    let height = match a {
+        a if a < 1.7 => Some(a.min(0.858)),
+        a if a < 10.0 => Some(0.88 * a.powf(1.0 / 6.0)),
+        _ => None,
+    };
+    (run_out, height)
+}

@@ -1,0 +1,326 @@
+//! What surrounds the particles of a rank, against a search through everything: rows H3, H4 and H5 of the list of
+//! verification tests, on 1, 2, 3 and 5 ranks. The test starts itself again under mpirun.
+
+use formats::h5::Communicator;
+use formats::scene::{Scene, WallLattice};
+use sph_run::algebra::Vector;
+use sph_run::dispatch::{Job, resolve};
+use sph_run::parallel::Reduce;
+use sph_run::parallel::halo::Fields;
+use sph_run::particles::{Particles, id, key};
+use sph_run::physics::Physics;
+use sph_run::simulation::{Clock, Simulation};
+use sph_run::space::Space;
+use std::collections::BTreeSet;
+
+const MARK: &str = "TALUS_TEST_HALO_UNDER_MPI";
+const DX: f64 = 0.01;
+
+const REST: &str = r#"
+spacing = "10 mm"
+[material.drucker-prager]
+density = "2600 kg/m3"
+young = "0.6 MPa"
+poisson = 0.3
+friction = "30 deg"
+cohesion = "0 Pa"
+[body.block]
+box = { min = [0, 0, 0], max = ["0.1 m", "0.1 m", "0.1 m"] }
+[wall.floor]
+axis = "z"
+at = "0 m"
+side = "above"
+slip = "no-slip"
+[wall.side]
+axis = "x"
+at = "0.13 m"
+side = "below"
+slip = "free-slip"
+[end]
+time = "1 s"
+"#;
+
+/// Space with planes of symmetry, and the cells of the block along x, y, z.
+const SCENES: [(&str, [usize; 3]); 3] = [
+    ("space = \"3d\"\nsymmetry = [\"x\", \"y\"]", [13, 8, 6]),
+    ("space = \"axisymmetric\"", [13, 1, 24]),
+    ("space = \"plane-strain\"\nsymmetry = [\"x\"]", [13, 1, 24]),
+];
+
+#[test]
+fn everything_within_reach_is_there() {
+    if std::env::var_os(MARK).is_none() {
+        for size in ["1", "2", "3", "5"] {
+            let mut mpirun = std::process::Command::new("mpirun");
+            mpirun.args(["-n", size]).arg(std::env::current_exe().unwrap());
+            mpirun.args(["--exact", "everything_within_reach_is_there", "--nocapture"]);
+            let output = mpirun.env(MARK, size).output().expect("mpirun starts");
+            let said = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+            assert!(output.status.success(), "{size} ranks: {}\n{}", said[0], said[1]);
+        }
+        return;
+    }
+    let universe = mpi::initialize().unwrap();
+    let comm = universe.world();
+    assert_eq!(std::env::var(MARK).unwrap(), Reduce::size(&comm).to_string());
+    // A rank that fails alone would leave the others waiting.
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        hook(info);
+        mpi::traits::Communicator::abort(&mpi::topology::SimpleCommunicator::world(), 1);
+    }));
+    for (head, cells) in SCENES {
+        // A box has no y in the plane spaces, and a body of rings must be a cylinder.
+        let rest = match head {
+            head if head.contains("axi") => REST.replace(
+                r#"box = { min = [0, 0, 0], max = ["0.1 m", "0.1 m", "0.1 m"] }"#,
+                r#"cylinder = { radius = "0.1 m", height = "0.1 m" }"#,
+            ),
+            head if head.contains("plane") => REST.replace(r#"["0.1 m", "0.1 m", "0.1 m"]"#, r#"["0.1 m", 0, "0.1 m"]"#),
+            _ => REST.to_owned(),
+        };
+        let scene = Scene::read("scene.toml", &format!("{head}{rest}")).expect("a sound scene");
+        for start in [Shares::AllOnTheFirst, Shares::AllOnTheLast, Shares::InTurn] {
+            resolve(&scene, Check { comm: &comm, scene: &scene, cells, start });
+        }
+    }
+}
+
+/// Who has which particles at the start.
+#[derive(Clone, Copy, Debug)]
+enum Shares {
+    AllOnTheFirst,
+    AllOnTheLast,
+    InTurn,
+}
+
+struct Check<'a> {
+    comm: &'a Communicator,
+    scene: &'a Scene,
+    cells: [usize; 3],
+    start: Shares,
+}
+
+/// Number in [-1, 1) from a place in a sequence.
+fn random(n: u64) -> f64 {
+    let mut z = n.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// A shift of particle `n`, each component within `size`.
+fn shift(round: u64, n: usize, size: f64) -> [f64; 3] {
+    [0, 1, 2].map(|a| size * random((round << 32) + 3 * n as u64 + a))
+}
+
+impl Job for Check<'_> {
+    type Output = ();
+    fn run<const D: usize, const N: usize, P: Physics<D, N>>(self, material: P::Material) {
+        let (rank, size) = (Reduce::rank(self.comm), Reduce::size(self.comm));
+        let [nx, ny, nz] = self.cells;
+        // The whole truth, on every rank.
+        let mut x: Vec<Vector<D>> = Vec::new();
+        for n in 0..nx * ny * nz {
+            let cell = [n / (ny * nz), n / nz % ny, n % nz];
+            let jitter = shift(0, n, 0.2 * DX);
+            x.push(P::Space::from_disk([0, 1, 2].map(|a| (cell[a] as f64 + 0.5) * DX + jitter[a])));
+        }
+        let mut mine = Particles::<D, N>::default();
+        for (n, &place) in x.iter().enumerate() {
+            let here = match self.start {
+                Shares::AllOnTheFirst => rank == 0,
+                Shares::AllOnTheLast => rank == size - 1,
+                Shares::InTurn => n % size == rank,
+            };
+            if here {
+                mine.key.push(key(n as u64, 0));
+                mine.x.push(place);
+                mine.v.push(Vector::default());
+                mine.a.push(Vector::default());
+                mine.stress.push(Default::default());
+                mine.mass.push(1.0 + n as f64);
+                mine.density.push(2600.0);
+                mine.history.push(Default::default());
+                mine.body.push(0);
+            }
+        }
+        mine.volume = vec![0.0; mine.key.len()];
+        mine.own(mine.key.len());
+
+        let count = x.len() as u64;
+        let mut simulation =
+            Simulation::<D, N, P>::new(self.comm, self.scene, material, mine, count, Clock::default());
+        let name = |what: &str| format!("{:?}, {size} ranks, rank {rank}, {:?}: {what}", self.scene.space, self.start);
+        compare(&simulation, self.scene, &x, &name("at the start"));
+
+        // As far as particles may go before lists are built again.
+        let furthest = 0.4999 * simulation.parameters.skin / (D as f64).sqrt();
+        let built = x.clone();
+        for round in 1..4 {
+            // The worst is when all go as far as they may: signs only.
+            let go = |n: usize| shift(round, n, 1.0).map(|s| furthest * s.signum());
+            shift_all(&mut simulation, &mut x, &built, go);
+            simulation.fill(Fields::Motion);
+            compare(&simulation, self.scene, &x, &name("with lists about to go stale"));
+        }
+        // Far, over several ranks' boxes, and together to one side, so that the shares are cut anew.
+        for (round, always) in [(4, false), (5, true), (6, false)] {
+            let before = x.clone();
+            shift_all(&mut simulation, &mut x, &before, |n| shift(round, n, 3.0 * DX));
+            simulation.always_rebalance = always;
+            simulation.rebuild();
+            compare(&simulation, self.scene, &x, &name("after a migration"));
+        }
+        let before = x.clone();
+        let centre = shift(7, 0, 0.05);
+        shift_all(&mut simulation, &mut x, &before, |n| {
+            let place = P::Space::to_disk(before[n]);
+            [0, 1, 2].map(|a| 0.3 * (centre[a].abs() - place[a]))
+        });
+        simulation.rebuild();
+        compare(&simulation, self.scene, &x, &name("pressed together"));
+    }
+}
+
+/// Moves all particles from where they were, the same ones the same way on all ranks; none through a plane of symmetry
+/// and none deep into a wall.
+fn shift_all<const D: usize, const N: usize, P: Physics<D, N>>(
+    simulation: &mut Simulation<D, N, P>,
+    x: &mut [Vector<D>],
+    from: &[Vector<D>],
+    shift: impl Fn(usize) -> [f64; 3],
+) {
+    for (n, x) in x.iter_mut().enumerate() {
+        let (old, by) = (P::Space::to_disk(from[n]), shift(n));
+        let mut new = [0, 1, 2].map(|a| old[a] + by[a]);
+        for plane in 0..2 {
+            new[plane] = if simulation.mirrors.planes[plane] { new[plane].abs() } else { new[plane] };
+        }
+        new[2] = new[2].max(-0.2 * DX);
+        *x = P::Space::from_disk(new);
+    }
+    let p = &mut simulation.particles;
+    for i in 0..p.owned {
+        p.x[i] = x[id(p.key[i]) as usize];
+    }
+}
+
+/// Keys of all material and of all its images, with their places.
+fn everything<const D: usize, const N: usize, P: Physics<D, N>>(
+    planes: [bool; 2],
+    x: &[Vector<D>],
+) -> Vec<(u64, Vector<D>)> {
+    let mut all = Vec::new();
+    for (n, &place) in x.iter().enumerate() {
+        for image in 0..4u8 {
+            if (0..2).all(|plane| image & (1 << plane) == 0 || planes[plane]) {
+                let mut place = P::Space::to_disk(place);
+                for (plane, coordinate) in place.iter_mut().take(2).enumerate() {
+                    *coordinate *= if image & (1 << plane) == 0 { 1.0 } else { -1.0 };
+                }
+                all.push((key(n as u64, image), P::Space::from_disk(place)));
+            }
+        }
+    }
+    all
+}
+
+/// All sites behind the walls that can be near any of the material.
+fn all_sites<const D: usize, const N: usize, P: Physics<D, N>>(
+    scene: &Scene,
+    material: &[(u64, Vector<D>)],
+) -> Vec<(u64, Vector<D>)> {
+    let lattice = WallLattice::new(scene);
+    let along = |axis: usize| {
+        let Some(a) = P::Space::axis(axis) else { return 0..1 };
+        // The middle of site 0 lies half a spacing from the origin: four sites on either side are more than 2h.
+        let origin = lattice.position([0; 3])[axis];
+        let sites = material.iter().map(|(_, x)| ((x.0[a] - origin) / DX).floor() as i32);
+        let (low, high) = sites.fold((i32::MAX, i32::MIN), |(low, high), s| (low.min(s), high.max(s)));
+        low - 4..high + 5
+    };
+    let mut sites = Vec::new();
+    for i in along(0) {
+        for j in along(1) {
+            for k in along(2) {
+                let place = lattice.position([i, j, k]);
+                if lattice.distance(place) < 0.0 {
+                    sites.push((WallLattice::id([i, j, k]), P::Space::from_disk(place)));
+                }
+            }
+        }
+    }
+    sites
+}
+
+fn within<const D: usize>(all: &[(u64, Vector<D>)], x: Vector<D>, support: f64) -> BTreeSet<u64> {
+    all.iter().filter(|(_, other)| (x - *other).norm2() < support * support).map(|(key, _)| *key).collect()
+}
+
+/// Compares what a rank has with what it should have. Collective.
+fn compare<const D: usize, const N: usize, P: Physics<D, N>>(
+    simulation: &Simulation<D, N, P>,
+    scene: &Scene,
+    x: &[Vector<D>],
+    name: &str,
+) {
+    let p = &simulation.particles;
+    let support = 2.0 * simulation.parameters.h;
+    let material = everything::<D, N, P>(simulation.mirrors.planes, x);
+    let walls = all_sites::<D, N, P>(scene, &material);
+
+    // Each particle has one owner; nothing of it was lost on the way.
+    let mut owners = vec![0u64; x.len()];
+    for i in 0..p.owned {
+        let n = id(p.key[i]) as usize;
+        owners[n] += 1;
+        assert_eq!(p.mass[i], 1.0 + n as f64, "{name}");
+    }
+    simulation.comm.sum(&mut owners);
+    assert!(owners.iter().all(|&n| n == 1), "{name}: owners of the particles: {owners:?}");
+    assert_eq!(p.x.len(), p.len());
+
+    let keys: BTreeSet<u64> = p.key.iter().copied().collect();
+    assert_eq!(keys.len(), p.len(), "{name}: a key stands for two particles");
+
+    // Copies are where the particles are.
+    let mut places = material.clone();
+    places.extend(&walls);
+    places.sort_unstable_by_key(|(key, _)| *key);
+    for (key, place) in p.key.iter().zip(&p.x) {
+        let true_place = places[places.binary_search_by_key(key, |(key, _)| *key).expect(name)].1;
+        assert_eq!(*place, true_place, "{name}: place of {key:x}");
+    }
+
+    let found = |x: Vector<D>, list: &[u32]| -> BTreeSet<u64> {
+        let keys: Vec<u64> = list.iter().map(|&j| p.key[j as usize]).collect();
+        assert!(keys.is_sorted_by(|a, b| a < b), "{name}: a list is not in ascending order");
+        let near = |&&j: &&u32| (x - p.x[j as usize]).norm2() < support * support;
+        list.iter().filter(near).map(|&j| p.key[j as usize]).collect()
+    };
+    let (mut pairs_with_walls, mut needed_walls) = (0, BTreeSet::new());
+    for i in 0..p.owned {
+        let mut wanted = within(&material, p.x[i], support);
+        wanted.remove(&p.key[i]);
+        let near_walls = within(&walls, p.x[i], support);
+        pairs_with_walls += near_walls.len();
+        wanted.extend(&near_walls);
+        needed_walls.extend(near_walls);
+        let list = found(p.x[i], simulation.neighbors.of_owned.of(i));
+        assert_eq!(list, wanted, "{name}: neighbours of particle {}", id(p.key[i]));
+    }
+    // What the wall particles that count see.
+    assert_eq!(simulation.neighbors.of_wall.len(), p.len() - p.mirror);
+    for wall in 0..simulation.neighbors.of_wall.len() {
+        let i = p.mirror + wall;
+        if needed_walls.contains(&p.key[i]) {
+            let list = found(p.x[i], simulation.neighbors.of_wall.of(wall));
+            assert_eq!(list, within(&material, p.x[i], support), "{name}: material around wall site {:x}", p.key[i]);
+        }
+    }
+    let mut seen = [pairs_with_walls as u64, (p.halo - p.owned) as u64, (p.mirror - p.halo) as u64];
+    simulation.comm.sum(&mut seen);
+    let alone = simulation.comm.size() == 1;
+    assert!(seen[0] > 0 && (alone || seen[1] > 0) && seen[2] > 0, "{name}: nothing was compared: {seen:?}");
+}

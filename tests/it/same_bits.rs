@@ -1,0 +1,338 @@
+//! The bits of the answer do not depend on the number of ranks, on how particles are shared out, on when checkpoints
+//! are taken, or on being stopped, killed and resumed: row H5 of the list of verification tests, on the programs.
+
+use formats::{exit, folder::RunFolder};
+use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+use std::{fs, process, thread};
+use tests::{Output, TIME_LIMIT, WorkFolder, assert_same_bits, command, prepared, run, run_within};
+
+/// What the scenes share: soft ground, so that a few hundred steps see a flow.
+const SHARED: &str = r#"
+[material.drucker-prager]
+density = "2600 kg/m3"
+young = "0.4 MPa"
+poisson = 0.3
+friction = "25 deg"
+cohesion = "0 Pa"
+
+[wall.floor]
+axis = "z"
+at = "0 m"
+side = "above"
+slip = "no-slip"
+"#;
+
+/// A column that is thrown off its plane of symmetry against a smooth wall.
+const PLANE: &str = r#"
+space = "plane-strain"
+spacing = "10 mm"
+symmetry = ["x"]
+[body.column]
+box = { min = [0, 0, 0], max = ["0.2 m", 0, "0.3 m"] }
+velocity = ["1 m/s", 0, 0]
+[wall.side]
+axis = "x"
+at = "0.28 m"
+side = "below"
+slip = "free-slip"
+[end]
+time = "0.12 s"
+[output]
+snapshots = "30 ms"
+history = "4 ms"
+"#;
+
+/// A jittered column around the axis; the last interval of each output is shorter than the others.
+const RINGS: &str = r#"
+space = "axisymmetric"
+spacing = "10 mm"
+[body.column]
+cylinder = { radius = "0.2 m", height = "0.2 m" }
+velocity = ["0.5 m/s", 0, 0]
+[initial]
+jitter = 0.05
+seed = 3
+[end]
+time = "0.13 s"
+[output]
+snapshots = "40 ms"
+history = "7 ms"
+"#;
+
+/// A quarter of a cylinder between two planes of symmetry.
+const SOLID: &str = r#"
+space = "3d"
+spacing = "12.5 mm"
+symmetry = ["x", "y"]
+[body.column]
+cylinder = { radius = "0.1 m", height = "0.15 m" }
+velocity = ["0.8 m/s", "0.3 m/s", 0]
+[end]
+time = "0.12 s"
+[output]
+snapshots = "40 ms"
+history = "10 ms"
+"#;
+
+fn scene(text: &str) -> String {
+    format!("{text}{SHARED}")
+}
+
+/// One scene, its answer by one rank, and folders to compute it in again.
+struct Trial {
+    work: WorkFolder,
+    reference: RunFolder,
+}
+
+impl Trial {
+    fn new(scene: &str) -> Self {
+        let work = WorkFolder::new();
+        let reference = tests::computed(&work, "one", scene, 1);
+        let steps = steps(&reference);
+        assert!((150..2000).contains(&steps), "{steps} steps are not a test");
+        Self { work, reference }
+    }
+
+    /// A folder with the reference's particles, as `sph-prep` leaves it.
+    fn fresh(&self, name: &str) -> RunFolder {
+        let folder = RunFolder::new(self.work.join(name));
+        fs::create_dir(folder.path()).unwrap();
+        for file in [RunFolder::scene, RunFolder::initial, RunFolder::provenance] {
+            fs::copy(file(&self.reference), file(&folder)).unwrap();
+        }
+        folder
+    }
+
+    /// Fails unless the run is done and left the same bits as the reference, file by file.
+    #[track_caller]
+    fn same(&self, folder: &RunFolder) {
+        assert!(folder.done().exists());
+        assert_same_bits(&self.reference, folder);
+        let (here, there) = (outputs(&self.reference), outputs(folder));
+        assert_eq!(here.keys().collect::<Vec<_>>(), there.keys().collect::<Vec<_>>());
+        for (name, hash) in &here {
+            assert_eq!(*hash, there[name], "{name}: the bytes differ in {}", folder.path().display());
+        }
+    }
+
+    /// Goes on in a folder. `extra` are options of `sph-run`.
+    #[track_caller]
+    fn go(&self, folder: &RunFolder, ranks: usize, extra: &[&str], code: i32) -> Output {
+        launch(folder, ranks, extra).expect(code)
+    }
+
+    /// On more ranks, from preparation on.
+    fn on_other_ranks(&self, scene: &str) {
+        for ranks in [2, 3, 5] {
+            let folder = prepared(&self.work, &format!("ranks-{ranks}"), scene, ranks);
+            let digest = |folder: &RunFolder| formats::snapshot::digest(&folder.initial()).unwrap();
+            assert_eq!(digest(&self.reference), digest(&folder), "initial.hdf of {ranks} ranks");
+            assert_eq!(hash(&self.reference.initial()), hash(&folder.initial()), "initial.hdf of {ranks} ranks");
+            self.go(&folder, ranks, &[], exit::DONE);
+            self.same(&folder);
+        }
+    }
+
+    /// Shared out anew at every build of the lists; checkpoints at odd moments.
+    fn with_other_habits(&self) {
+        let folder = self.fresh("habits");
+        self.go(&folder, 3, &["--always-rebalance", "--checkpoint-every", "37steps"], exit::DONE);
+        self.same(&folder);
+    }
+
+    /// Stopped again and again, and resumed on other numbers of ranks.
+    fn in_pieces(&self) {
+        let folder = self.fresh("pieces");
+        for (ranks, steps) in [(1, "0"), (1, "41"), (3, "1"), (2, "57")] {
+            self.go(&folder, ranks, &["--stop-after-steps", steps], exit::RESUMABLE);
+            assert!(!folder.done().exists());
+        }
+        let resumed = self.go(&folder, 5, &[], exit::DONE);
+        assert!(resumed.stderr.contains("step 99"), "{resumed}");
+        self.same(&folder);
+    }
+
+    /// One rank is killed after the second checkpoint; resumed on another number of ranks.
+    fn after_a_kill(&self) {
+        let folder = self.fresh("killed");
+        let output = while_running(&folder, 3, |folder| {
+            let ranks = processes(folder.path(), "sph-run");
+            signal("KILL", ranks[ranks.len() / 2]);
+        });
+        assert!(!output.timed_out && output.code != exit::DONE && output.code != exit::RESUMABLE, "{output}");
+        assert!(!folder.done().exists());
+        let resumed = self.go(&folder, 2, &[], exit::DONE);
+        assert!(resumed.stderr.contains("resuming"), "{resumed}");
+        self.same(&folder);
+    }
+
+    /// Once more after the end: nothing happens.
+    fn after_the_end(&self) {
+        let before = state(self.reference.path());
+        for ranks in [1, 3] {
+            self.go(&self.reference, ranks, &[], exit::DONE);
+        }
+        assert_eq!(before, state(self.reference.path()));
+        self.go(&self.reference, 2, &["--new"], exit::USAGE);
+        assert_eq!(before, state(self.reference.path()));
+    }
+
+    /// Killed between the last checkpoint and the mark that the run is done.
+    fn without_the_last_mark(&self) {
+        fs::remove_file(self.reference.done()).unwrap();
+        let before = outputs(&self.reference);
+        self.go(&self.reference, 2, &[], exit::DONE);
+        assert!(self.reference.done().exists());
+        assert_eq!(before, outputs(&self.reference));
+    }
+}
+
+fn launch(folder: &RunFolder, ranks: usize, extra: &[&str]) -> Output {
+    let mut arguments = vec![folder.path().as_os_str()];
+    arguments.extend(extra.iter().map(OsStr::new));
+    run("sph-run", &arguments, ranks)
+}
+
+/// Steps of a run, from the last line of its history.
+fn steps(folder: &RunFolder) -> u64 {
+    let history = fs::read_to_string(folder.history()).unwrap();
+    history.lines().last().and_then(|line| line.split(',').nth(1)?.parse().ok()).expect("a second column")
+}
+
+fn hash(path: &Path) -> String {
+    formats::provenance::sha256(&fs::read(path).unwrap())
+}
+
+/// Hashes of the bytes of everything in out/.
+fn outputs(folder: &RunFolder) -> BTreeMap<OsString, String> {
+    let entries = fs::read_dir(folder.out()).unwrap().map(|entry| entry.unwrap());
+    entries.map(|entry| (entry.file_name(), hash(&entry.path()))).collect()
+}
+
+/// Every file below a folder, its length and when it was written.
+fn state(folder: &Path) -> BTreeMap<PathBuf, (u64, SystemTime)> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let facts = fs::metadata(&path).unwrap();
+        if facts.is_dir() {
+            found.extend(state(&path));
+        } else {
+            found.insert(path, (facts.len(), facts.modified().unwrap()));
+        }
+    }
+    found
+}
+
+/// Starts a run with a checkpoint every 20 steps and, once there are two, does something to it.
+fn while_running(folder: &RunFolder, ranks: usize, act: impl FnOnce(&RunFolder) + Send) -> Output {
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            let deadline = Instant::now() + Duration::from_secs(60);
+            while !folder.generation(2).join("MANIFEST.json").exists() {
+                assert!(Instant::now() < deadline, "no checkpoint within a minute");
+                thread::sleep(Duration::from_millis(2));
+            }
+            act(folder);
+        });
+        let arguments = [folder.path().as_os_str(), "--checkpoint-every".as_ref(), "20steps".as_ref()];
+        run_within(TIME_LIMIT, &mut command("sph-run", &arguments, ranks))
+    })
+}
+
+/// Processes of a program that name a folder of this test in their arguments.
+fn processes(folder: &Path, program: &str) -> Vec<u32> {
+    let numbers = fs::read_dir("/proc").unwrap().filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
+    let matches = |pid: &u32| {
+        let Ok(line) = fs::read(format!("/proc/{pid}/cmdline")) else { return false };
+        let arguments: Vec<&[u8]> = line.split(|&byte| byte == 0).collect();
+        let name = Path::new(OsStr::from_bytes(arguments[0])).file_name();
+        name == Some(OsStr::new(program)) && arguments.contains(&folder.as_os_str().as_bytes())
+    };
+    let found: Vec<u32> = numbers.filter(matches).collect();
+    assert!(!found.is_empty(), "no {program} runs in {}", folder.display());
+    found
+}
+
+fn signal(name: &str, process: u32) {
+    let status = process::Command::new("kill").args(["-s", name, &process.to_string()]).status();
+    assert!(status.expect("kill starts").success());
+}
+
+#[test]
+fn plane_strain() {
+    let text = scene(PLANE);
+    let trial = Trial::new(&text);
+    trial.on_other_ranks(&text);
+    trial.with_other_habits();
+    trial.in_pieces();
+    trial.after_a_kill();
+    trial.after_the_end();
+    trial.without_the_last_mark();
+}
+
+#[test]
+fn axisymmetric() {
+    let text = scene(RINGS);
+    let trial = Trial::new(&text);
+    trial.on_other_ranks(&text);
+    trial.with_other_habits();
+    trial.in_pieces();
+    trial.after_a_kill();
+}
+
+#[test]
+fn three_d() {
+    let text = scene(SOLID);
+    let trial = Trial::new(&text);
+    trial.on_other_ranks(&text);
+    trial.with_other_habits();
+    trial.in_pieces();
+    trial.after_a_kill();
+}
+
+/// By a signal to mpirun, by one to a single rank, by a file: exit code 75, and the same command goes on.
+#[test]
+fn stopped_on_request() {
+    let trial = Trial::new(&scene(RINGS));
+    let folder = trial.fresh("stopped");
+    let to_mpirun = |folder: &RunFolder| signal("USR1", processes(folder.path(), "mpirun")[0]);
+    while_running(&folder, 2, to_mpirun).expect(exit::RESUMABLE);
+    trial.go(&folder, 3, &[], exit::DONE);
+    trial.same(&folder);
+
+    let folder = trial.fresh("one-rank");
+    let to_one = |folder: &RunFolder| signal("TERM", *processes(folder.path(), "sph-run").last().unwrap());
+    while_running(&folder, 3, to_one).expect(exit::RESUMABLE);
+    trial.go(&folder, 1, &[], exit::DONE);
+    trial.same(&folder);
+
+    // A file is looked for twice a second: a run that takes longer than that.
+    let longer = scene(&RINGS.replace("0.13 s", "2 s").replace("7 ms", "0.5 s").replace("40 ms", "1 s"));
+    let folder = prepared(&trial.work, "file", &longer, 2);
+    while_running(&folder, 2, |folder| fs::write(folder.stop(), "").unwrap()).expect(exit::RESUMABLE);
+    assert!(!folder.stop().exists(), "the request is honoured once");
+    trial.go(&folder, 2, &["--stop-after-steps", "1"], exit::RESUMABLE);
+}
+
+/// A run that ends at rest ends there also when it was killed before it was marked as done.
+#[test]
+fn at_rest() {
+    let text = scene(&RINGS.replace("[end]", "[end]\nat-rest = 0.9"));
+    let trial = Trial::new_ending_early(&text);
+    trial.without_the_last_mark();
+}
+
+impl Trial {
+    fn new_ending_early(scene: &str) -> Self {
+        let work = WorkFolder::new();
+        let reference = tests::computed(&work, "one", scene, 1);
+        let history = fs::read_to_string(reference.history()).unwrap();
+        assert!(history.lines().count() < 15, "it should come to rest before its end time:\n{history}");
+        Self { work, reference }
+    }
+}
