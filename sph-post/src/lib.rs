@@ -17,6 +17,7 @@ pub mod plot;
 pub mod report;
 pub mod sample;
 pub mod scatter;
+pub mod summary;
 #[cfg(test)]
 mod testing;
 
@@ -62,6 +63,7 @@ fn evaluate(arguments: &Arguments) -> Result<Vec<PathBuf>, Failure> {
         netcdf::history(&analysis, history).write(&path)?;
         paths.push(path);
     }
+    paths.extend(summary::write(&analysis, &post)?);
     paths.extend(plot::pictures(&analysis, &post)?);
     if !arguments.quiet {
         eprint!("{}", report::table(&analysis));

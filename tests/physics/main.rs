@@ -45,7 +45,8 @@ impl Default for Scene {
 impl Scene {
     /// As a user would write it.
     fn text(&self) -> String {
-        let Self { space, spacing, symmetry, density, young, poisson, cohesion, body, walls, numerics, end, history } = self;
+        let Self { space, spacing, symmetry, density, young, poisson, cohesion, body, walls, numerics, end, history } =
+            self;
         format!(
             "space = \"{space}\"\nspacing = {spacing}\nsymmetry = {symmetry}\n\
              [material.drucker-prager]\ndensity = {density}\nyoung = {young}\npoisson = {poisson}\n\
