@@ -153,8 +153,11 @@ fn range(low: f64, high: f64, dx: f64, most: i64) -> (i64, usize) {
 fn thickness(g: &Geometry, rows: &Rows) -> Bins {
     let along = || rows.position.iter().map(|&x| g.along(x));
     let (low, high) = along().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s), h.max(s)));
-    let low = if g.radial || g.mirrored[0] { 0.0 } else { low - 0.499 * g.dx };
-    let (first, count) = range(low, high.max(low) + 0.499 * g.dx, g.dx, MOST_BINS[0]);
+    // No bins behind a wall: what is spread beyond it, or has sunk into it, belongs to the bin before it.
+    let [lowest, highest] = [g.walls[0] + 1e-6 * g.dx, g.walls[1] - 1e-6 * g.dx];
+    let low = if g.radial || g.mirrored[0] { 0.0 } else { (low - 0.499 * g.dx).max(lowest) };
+    let high = (high.max(low) + 0.499 * g.dx).min(highest);
+    let (first, count) = range(low, high, g.dx, MOST_BINS[0]);
     let mut values = vec![0.0; count];
     for (row, s) in along().enumerate() {
         let volume = rows.mass[row] / rows.density[row];
@@ -163,6 +166,8 @@ fn thickness(g: &Geometry, rows: &Rows) -> Bins {
         for (k, share) in [(k, 1.0 - part), (k + 1.0, part)] {
             // What would lie beyond the axis or the plane of symmetry comes back by mirroring.
             let k = if k < 0.0 && (g.radial || g.mirrored[0]) { -1.0 - k } else { k };
+            let k = if lowest.is_finite() { k.max(0.0) } else { k };
+            let k = if highest.is_finite() { k.min(count as f64 - 1.0) } else { k };
             if k >= 0.0 && k < count as f64 {
                 values[k as usize] += volume * share;
             }
@@ -189,7 +194,8 @@ fn fronts(g: &Geometry, rows: &Rows, profile: &Profile) -> Fronts {
         below = (s, sum);
     }
     let furthest = order.last().map_or(0.0, |f| f.0) + 0.5 * g.dx;
-    Fronts { furthest, mass, thickness: edge(g, profile) }
+    // A bin counts as filled as a whole, so the edge could lie beyond the last particle.
+    Fronts { furthest, mass, thickness: edge(g, profile).min(furthest) }
 }
 
 /// From the bin that holds most volume outward to the first one thinner than half a spacing; that one counts by

@@ -25,6 +25,8 @@ pub struct Geometry {
     pub floor: f64,
     /// Are x = 0 and y = 0 planes (or, axisymmetric, x = 0 the axis) at which particles are mirrored?
     pub mirrored: [bool; 2],
+    /// Where a wall across x bounds the material on its lower and its upper side, m; infinite where none does.
+    pub walls: [f64; 2],
     /// Are profiles taken along the radius (else along x)?
     pub radial: bool,
     /// Width of the material across the profile, m: 1 in plane strain, the y extent in 3-D; not for radial profiles.
@@ -66,6 +68,9 @@ impl Geometry {
             gravity: scene.gravity,
             floor,
             mirrored: if scene.space == Space::Axisymmetric { [true, false] } else { scene.symmetry },
+            walls: [(1.0, f64::NEG_INFINITY), (-1.0, f64::INFINITY)].map(|(side, none)| {
+                scene.walls.iter().find(|w| w.axis == 0 && w.side == side).map_or(none, |w| w.at)
+            }),
             radial,
             width: width(scene),
             density: law.density,

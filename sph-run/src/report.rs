@@ -133,13 +133,17 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         }
         self.comm.sum(&mut bins);
         let wanted = MASS_SHARE * bins.iter().sum::<u64>() as f64;
-        let mut inside = 0u64;
-        for (k, &bin) in bins.iter().enumerate() {
-            if (inside + bin) as f64 >= wanted {
-                let part = (wanted - inside as f64) / bin.max(1) as f64;
-                return (k as f64 + part) * width;
-            }
+        // Between the bins that hold something, the share of mass inside grows linearly: in a sparse toe a bin is one
+        // particle, and `sph-post` interpolates between particles in the same way.
+        let (mut inside, mut before) = (0u64, (0.0, 0.0));
+        for (k, &bin) in bins.iter().enumerate().filter(|(_, bin)| **bin > 0) {
             inside += bin;
+            let here = ((k as f64 + 0.5) * width, inside as f64);
+            if here.1 >= wanted {
+                let part = (wanted - before.1) / (here.1 - before.1);
+                return before.0 + part * (here.0 - before.0);
+            }
+            before = here;
         }
         farthest
     }

@@ -9,7 +9,7 @@ use sph_run::material::{DruckerPrager, Material};
 use sph_run::particles::Particles;
 use sph_run::physics::{CubicSpline, Kernel, Model, Physics, WendlandC2};
 use sph_run::simulation::{Clock, Simulation};
-use sph_run::space::{PlaneStrain, Space, ThreeD};
+use sph_run::space::{Axisymmetric, PlaneStrain, Space, ThreeD};
 use sph_run::timestep::Requests;
 
 /// Spacing, m, and density, kg/m3.
@@ -69,7 +69,8 @@ fn block<const D: usize, const N: usize, S: Space<D, N>>(side: usize) -> Rows {
     }
     let count = rows.len();
     rows.body = vec![0; count];
-    rows.mass = vec![DENSITY * DX.powi(D as i32); count];
+    let mass = |x: &[f64; 3]| DENSITY * DX.powi(D as i32) / S::volume(1.0, 1.0, S::from_disk(*x), DX);
+    rows.mass = rows.position.iter().map(mass).collect();
     rows.density = vec![DENSITY; count];
     rows.stress = vec![[0.0; 6]; count];
     rows.plastic_strain = vec![0.0; count];
@@ -79,7 +80,9 @@ fn block<const D: usize, const N: usize, S: Space<D, N>>(side: usize) -> Rows {
 /// Kinetic and elastic energy, J.
 fn energy<const D: usize, const N: usize, P: Physics<D, N>>(run: &Simulation<D, N, P>) -> f64 {
     let p = &run.particles;
-    let of = |i: usize| 0.5 * p.mass[i] * p.v[i].norm2() + p.volume[i] * run.material.elastic_energy(p.stress[i]);
+    let of = |i: usize| {
+        0.5 * p.mass[i] * p.v[i].norm2() + p.mass[i] / p.density[i] * run.material.elastic_energy(p.stress[i])
+    };
     (0..p.owned).map(of).sum()
 }
 
@@ -88,6 +91,7 @@ fn c13_the_leap_frog_is_stable_up_to_its_limit() {
     type Solid = Model<ThreeD, CubicSpline, DruckerPrager>;
     type Plane = Model<PlaneStrain, CubicSpline, DruckerPrager>;
     type PlaneOfWendland = Model<PlaneStrain, WendlandC2, DruckerPrager>;
+    type Rings = Model<Axisymmetric, CubicSpline, DruckerPrager>;
     let universe = mpi::initialize().expect("MPI starts");
     let comm = universe.world();
     // Theory 1.84 and 1.87 h/c (wave number of the largest frequency on the infinite lattice); these free blocks have
@@ -100,6 +104,13 @@ fn c13_the_leap_frog_is_stable_up_to_its_limit() {
         assert_eq!(growth::<3, 6, Solid>(&comm, 10, courant), f64::INFINITY, "3-D at {courant} h/c");
         assert_eq!(growth::<2, 4, Plane>(&comm, 20, courant), f64::INFINITY, "2-D at {courant} h/c");
     }
+    // Rings: the hoop stress of the first one, at dx/2, adds (2 c/dx)^2 to the largest frequency squared, and the limit
+    // falls to 0.76 h/c, measured between 0.75 and 0.80. Below it energy still grows slowly where nothing takes it out
+    // (22 1/s here, whatever the step: the signed radius of images across the axis, which balances an isotropic stress
+    // there, is not work-conjugate). A viscosity of 0.1 holds that down. Measured 3.1 at the end.
+    let rings = growth::<2, 4, Rings>(&comm, 20, 0.6);
+    assert!(rings < 10.0, "{rings}");
+    assert_eq!(growth::<2, 4, Rings>(&comm, 20, 0.9), f64::INFINITY);
     // Wendland C2 with h = 2 dx: theory 1.76, measured between 1.76 and 1.80.
     assert_bounded(growth::<2, 4, PlaneOfWendland>(&comm, 20, 1.7), 1.7);
     assert_eq!(growth::<2, 4, PlaneOfWendland>(&comm, 20, 1.85), f64::INFINITY);
