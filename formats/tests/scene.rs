@@ -248,10 +248,11 @@ fn what_is_allowed_at_the_borders_is_read() {
     // K0 follows from the elasticity.
     let scene = good(COLUMN, "[end]", "[initial]\nstress = \"k0\"\n[end]");
     assert_eq!(scene.initial.stress, InitialStress::K0 { coefficient: 0.3 / (1.0 - 0.3) });
-    // The default of h/dx depends on kernel and space.
+    // The default of h/dx depends on the kernel.
     let scene = good(COLUMN, "[end]", "[kernel]\nkind = \"wendland-c2\"\n[end]");
-    assert_eq!((scene.kernel, scene.h_over_dx), (Kernel::WendlandC2, 2.0));
-    good(COLUMN, "[end]", "[kernel]\nh-over-dx = 3\n[numerics]\ncourant = 1.7\n[end]");
+    assert_eq!((scene.kernel, scene.h_over_dx), (Kernel::WendlandC2, 1.5625));
+    good(COLUMN, "[end]", "[kernel]\nh-over-dx = 3\n[numerics]\ncourant = 0.7\n[end]");
+    good(PLANE, "[end]", "[numerics]\ncourant = 1.7\n[end]");
     // A ceiling a whole number of spacings above the floor, and an outer cylinder.
     let ceiling = "[wall.ceiling]\naxis = \"z\"\nat = \"0.3 m\"\nside = \"below\"\nslip = \"free-slip\"\n";
     let outer = "[wall.outer]\naxis = \"x\"\nat = \"0.3 m\"\nside = \"below\"\nslip = \"free-slip\"\n";

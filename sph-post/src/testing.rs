@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 /// A geometry of density 2000 kg/m3 on a floor at 0, symmetric about x = 0 (and y = 0 in 3-D).
 pub fn geometry(space: Space, kernel: Kernel, dx: f64) -> Geometry {
-    let h = dx * kernel.default_h_over_dx(space.dimension());
+    let h = dx * kernel.default_h_over_dx();
     Geometry {
         space,
         kernel,

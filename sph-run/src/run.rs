@@ -5,6 +5,7 @@ use crate::dispatch::Job;
 use crate::error::{Fault, RunError};
 use crate::limits::Limits;
 use crate::output;
+use crate::parallel::Reduce;
 use crate::parallel::agree::agree;
 use crate::particles::Particles;
 use crate::physics::Physics;
@@ -17,7 +18,6 @@ use formats::h5::{self, Communicator};
 use formats::scene::Scene;
 use formats::schema::Kept;
 use formats::{checkpoint, snapshot};
-use crate::parallel::Reduce;
 use std::time::Instant;
 
 /// How a run ended.
@@ -65,8 +65,7 @@ impl Job for Run<'_> {
             simulation.accelerate();
         }
         let files = agree(self.comm, || Files::open(self.folder, &self.start))?;
-        let progress =
-            Progress::new(self.cli.quiet || rank != 0, &simulation.clock, self.scene.end.time, count);
+        let progress = Progress::new(self.cli.quiet || rank != 0, &simulation.clock, self.scene.end.time, count);
         Course { scales: Scales::new(self.scene), job: self, simulation, files, progress, checkpointed: Instant::now() }
             .follow()
     }
@@ -196,7 +195,9 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
     fn requests(&mut self) -> crate::timestep::Requests {
         let root = self.job.comm.rank() == 0;
         let checkpoint = match self.job.cli.checkpoint_every {
-            Cadence::Steps(n) => self.simulation.clock.step > self.job.start.clock.step && self.simulation.clock.step % n == 0,
+            Cadence::Steps(n) => {
+                self.simulation.clock.step > self.job.start.clock.step && self.simulation.clock.step.is_multiple_of(n)
+            }
             Cadence::Wall(interval) => root && self.checkpointed.elapsed() >= interval,
         };
         crate::timestep::Requests { stop: self.job.limits.stop(root), checkpoint }
@@ -244,7 +245,9 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         let header = self.simulation.header(self.job.scene, &self.job.scene_hash);
         let mut rows = self.simulation.rows();
         let reals = [&mut rows.position, &mut rows.velocity, &mut rows.acceleration].into_iter().flatten().flatten();
-        for real in reals.chain(rows.stress.iter_mut().flatten()).chain(&mut rows.density).chain(&mut rows.plastic_strain) {
+        for real in
+            reals.chain(rows.stress.iter_mut().flatten()).chain(&mut rows.density).chain(&mut rows.plastic_strain)
+        {
             if !real.is_finite() {
                 *real = f64::MAX;
             }

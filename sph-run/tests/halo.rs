@@ -76,7 +76,9 @@ fn everything_within_reach_is_there() {
                 r#"box = { min = [0, 0, 0], max = ["0.1 m", "0.1 m", "0.1 m"] }"#,
                 r#"cylinder = { radius = "0.1 m", height = "0.1 m" }"#,
             ),
-            head if head.contains("plane") => REST.replace(r#"["0.1 m", "0.1 m", "0.1 m"]"#, r#"["0.1 m", 0, "0.1 m"]"#),
+            head if head.contains("plane") => {
+                REST.replace(r#"["0.1 m", "0.1 m", "0.1 m"]"#, r#"["0.1 m", 0, "0.1 m"]"#)
+            }
             _ => REST.to_owned(),
         };
         let scene = Scene::read("scene.toml", &format!("{head}{rest}")).expect("a sound scene");
@@ -147,8 +149,7 @@ impl Job for Check<'_> {
         mine.own(mine.key.len());
 
         let count = x.len() as u64;
-        let mut simulation =
-            Simulation::<D, N, P>::new(self.comm, self.scene, material, mine, count, Clock::default());
+        let mut simulation = Simulation::<D, N, P>::new(self.comm, self.scene, material, mine, count, Clock::default());
         let name = |what: &str| format!("{:?}, {size} ranks, rank {rank}, {:?}: {what}", self.scene.space, self.start);
         compare(&simulation, self.scene, &x, &name("at the start"));
 
@@ -209,7 +210,10 @@ fn shift_all<const D: usize, const N: usize, P: Physics<D, N>>(
 }
 
 /// The rank that owns each particle. Collective.
-fn owners<const D: usize, const N: usize, P: Physics<D, N>>(simulation: &Simulation<D, N, P>, count: usize) -> Vec<u64> {
+fn owners<const D: usize, const N: usize, P: Physics<D, N>>(
+    simulation: &Simulation<D, N, P>,
+    count: usize,
+) -> Vec<u64> {
     let mut owners = vec![0u64; count];
     for &key in &simulation.particles.key[..simulation.particles.owned] {
         owners[id(key) as usize] = Reduce::rank(simulation.comm) as u64;

@@ -125,23 +125,18 @@ impl Trial {
         launch(folder, ranks, extra).expect(code)
     }
 
-    /// On more ranks, from preparation on.
+    /// On more ranks, from preparation on; on three of them with particles shared out anew at every build of the lists
+    /// and checkpoints at odd moments.
     fn on_other_ranks(&self, scene: &str) {
-        for ranks in [2, 3, 5] {
+        let habits = ["--always-rebalance", "--checkpoint-every", "37steps"];
+        for (ranks, habits) in [(2, &[][..]), (3, &habits), (5, &[])] {
             let folder = prepared(&self.work, &format!("ranks-{ranks}"), scene, ranks);
             let digest = |folder: &RunFolder| formats::snapshot::digest(&folder.initial()).unwrap();
             assert_eq!(digest(&self.reference), digest(&folder), "initial.hdf of {ranks} ranks");
             assert_eq!(hash(&self.reference.initial()), hash(&folder.initial()), "initial.hdf of {ranks} ranks");
-            self.go(&folder, ranks, &[], exit::DONE);
+            self.go(&folder, ranks, habits, exit::DONE);
             self.same(&folder);
         }
-    }
-
-    /// Shared out anew at every build of the lists; checkpoints at odd moments.
-    fn with_other_habits(&self) {
-        let folder = self.fresh("habits");
-        self.go(&folder, 3, &["--always-rebalance", "--checkpoint-every", "37steps"], exit::DONE);
-        self.same(&folder);
     }
 
     /// Stopped again and again, and resumed on other numbers of ranks.
@@ -266,7 +261,6 @@ fn plane_strain() {
     let text = scene(PLANE);
     let trial = Trial::new(&text);
     trial.on_other_ranks(&text);
-    trial.with_other_habits();
     trial.in_pieces();
     trial.after_a_kill();
     trial.after_the_end();
@@ -278,7 +272,6 @@ fn axisymmetric() {
     let text = scene(RINGS);
     let trial = Trial::new(&text);
     trial.on_other_ranks(&text);
-    trial.with_other_habits();
     trial.in_pieces();
     trial.after_a_kill();
 }
@@ -288,7 +281,6 @@ fn three_d() {
     let text = scene(SOLID);
     let trial = Trial::new(&text);
     trial.on_other_ranks(&text);
-    trial.with_other_habits();
     trial.in_pieces();
     trial.after_a_kill();
 }
