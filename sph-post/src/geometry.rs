@@ -68,9 +68,8 @@ impl Geometry {
             gravity: scene.gravity,
             floor,
             mirrored: if scene.space == Space::Axisymmetric { [true, false] } else { scene.symmetry },
-            walls: [(1.0, f64::NEG_INFINITY), (-1.0, f64::INFINITY)].map(|(side, none)| {
-                scene.walls.iter().find(|w| w.axis == 0 && w.side == side).map_or(none, |w| w.at)
-            }),
+            walls: [(1.0, f64::NEG_INFINITY), (-1.0, f64::INFINITY)]
+                .map(|(side, none)| scene.walls.iter().find(|w| w.axis == 0 && w.side == side).map_or(none, |w| w.at)),
             radial,
             width: width(scene),
             density: law.density,

@@ -9,8 +9,12 @@ use std::time::Duration;
 /// Alone or under mpirun. Started again in the same folder it resumes from the newest valid checkpoint; once the run
 /// is done it does nothing. USR1, TERM, INT or a file named STOP in the run folder end it after a checkpoint.
 #[derive(Debug, Parser)]
-#[command(name = "sph-run", version, after_help = "Exit codes: 0 done, 2 usage or scene, 65 no valid input, \
-70 numerical failure, 73 cannot write, 75 stopped early (the same command resumes), 76 locked by another run.")]
+#[command(
+    name = "sph-run",
+    version,
+    after_help = "Exit codes: 0 done, 2 usage or scene, 65 no valid input, \
+70 numerical failure, 73 cannot write, 75 stopped early (the same command resumes), 76 locked by another run."
+)]
 pub struct Cli {
     /// The run folder made by sph-prep.
     pub run: PathBuf,

@@ -21,7 +21,7 @@ impl Sum {
 
     /// Adds a term.
     pub fn add(&mut self, term: f64) {
-        self.total += (term / self.unit) as i128;
+        self.total = self.total.saturating_add((term / self.unit) as i128);
     }
 
     /// The total.

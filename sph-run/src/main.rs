@@ -7,12 +7,12 @@ use formats::h5::Communicator;
 use formats::scene::Scene;
 use mpi::traits::Communicator as _;
 use sph_run::cli::Cli;
+use sph_run::dispatch;
 use sph_run::error::RunError;
 use sph_run::limits::Limits;
 use sph_run::parallel::agree::{agree, share_text};
 use sph_run::resume::Start;
 use sph_run::run::{Outcome, Run};
-use sph_run::dispatch;
 
 fn main() {
     let signalled = Limits::watch_signals();

@@ -108,7 +108,8 @@ impl<const D: usize> Cells<D> {
             width *= 2.0;
         }
         let count = shape(width);
-        let mut cells = Self { low, width, count, starts: vec![0; count.iter().product::<usize>() + 1], members: vec![] };
+        let mut cells =
+            Self { low, width, count, starts: vec![0; count.iter().product::<usize>() + 1], members: vec![] };
         let cell: Vec<u32> = by_key.iter().map(|&i| cells.index(cells.coordinates(x[i as usize])) as u32).collect();
         for &c in &cell {
             cells.starts[c as usize + 1] += 1;
@@ -161,19 +162,15 @@ impl<const D: usize> Cells<D> {
 pub fn bounds<const D: usize>(x: &[Vector<D>]) -> (Vector<D>, Vector<D>) {
     let Some(&first) = x.first() else { return (Vector::default(), Vector::default()) };
     x.iter().fold((first, first), |(low, high), p| {
-        (
-            Vector(std::array::from_fn(|a| low.0[a].min(p.0[a]))),
-            Vector(std::array::from_fn(|a| high.0[a].max(p.0[a]))),
-        )
+        (Vector(std::array::from_fn(|a| low.0[a].min(p.0[a]))), Vector(std::array::from_fn(|a| high.0[a].max(p.0[a]))))
     })
 }
 
 /// The order of owned particles along rows of cells of the given width: close in memory what is close in space.
 pub fn cell_order<const D: usize>(x: &[Vector<D>], width: f64) -> Vec<u32> {
     let (low, _) = bounds(x);
-    let cell = |p: &Vector<D>| -> [u64; D] {
-        std::array::from_fn(|a| ((p.0[D - 1 - a] - low.0[D - 1 - a]) / width) as u64)
-    };
+    let cell =
+        |p: &Vector<D>| -> [u64; D] { std::array::from_fn(|a| ((p.0[D - 1 - a] - low.0[D - 1 - a]) / width) as u64) };
     let mut order: Vec<u32> = (0..x.len() as u32).collect();
     order.sort_by_cached_key(|&i| (cell(&x[i as usize]), i));
     order

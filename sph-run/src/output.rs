@@ -88,7 +88,8 @@ pub fn history_head() -> String {
 }
 
 /// First line of the log of rates.
-pub const PERFORMANCE_HEAD: &str = "time [s],step [1],wall [s],particle_steps_per_second [1/s],imbalance [1],ranks [1]\n";
+pub const PERFORMANCE_HEAD: &str =
+    "time [s],step [1],wall [s],particle_steps_per_second [1/s],imbalance [1],ranks [1]\n";
 
 /// Writes the index of the snapshots, which ParaView opens as a series in time.
 pub fn write_series(folder: &RunFolder, times: &[f64]) -> Result<(), RunError> {

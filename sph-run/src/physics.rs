@@ -34,7 +34,9 @@ pub trait Physics<const D: usize, const N: usize>: 'static {
 /// The only [`Physics`] there is: three types side by side.
 pub struct Model<S, K, M>(PhantomData<(S, K, M)>);
 
-impl<const D: usize, const N: usize, S: Space<D, N>, K: Kernel, M: Material + 'static> Physics<D, N> for Model<S, K, M> {
+impl<const D: usize, const N: usize, S: Space<D, N>, K: Kernel, M: Material + 'static> Physics<D, N>
+    for Model<S, K, M>
+{
     type Space = S;
     type Kernel = K;
     type Material = M;

@@ -58,7 +58,7 @@ impl Progress {
         let rate = self.rate(clock);
         match &mut self.sink {
             Sink::Bar(bar) => {
-                if clock.step % 16 == 0 {
+                if clock.step.is_multiple_of(16) {
                     bar.set_position((done * TICKS as f64) as u64);
                     bar.set_message(format!("t = {:.4} s, step {}", clock.time, clock.step));
                 }

@@ -91,7 +91,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
         let mass_bound = max_mass * par.count as f64;
         let energy_bound = mass_bound * par.sound_speed * par.sound_speed;
-        let mut sums = [energy_bound, energy_bound, energy_bound, mass_bound / scales.density, mass_bound].map(Sum::new);
+        let mut sums =
+            [energy_bound, energy_bound, energy_bound, mass_bound / scales.density, mass_bound].map(Sum::new);
         let mut below = [0u64];
         for i in 0..p.owned {
             let volume = p.mass[i] / p.density[i];

@@ -134,7 +134,8 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
     /// Shares the particles out anew if the load has shifted, sends them home, and builds halo, boundaries and lists.
     pub fn rebuild(&mut self) {
         let now = self.particles.owned as u64;
-        let mut shifted = [u64::from(self.always_rebalance || self.partition.planned.is_none_or(|then| changed(then, now)))];
+        let mut shifted =
+            [u64::from(self.always_rebalance || self.partition.planned.is_none_or(|then| changed(then, now)))];
         self.comm.sum(&mut shifted);
         if shifted[0] > 0 {
             let owned = &self.particles.x[..self.particles.owned];
@@ -169,7 +170,11 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         Mirrors::fill_motion::<D, N, P::Space>(&mut self.particles, &self.images);
         self.walls.create::<D, N, P::Space>(&mut self.particles, reach);
         self.neighbors.build(&self.particles, reach);
-        self.walls.fill_motion::<D, N, P::Space, P::Kernel>(&mut self.particles, &self.neighbors, self.parameters.pairs);
+        self.walls.fill_motion::<D, N, P::Space, P::Kernel>(
+            &mut self.particles,
+            &self.neighbors,
+            self.parameters.pairs,
+        );
     }
 
     /// Brings everything around the owned particles up to date, in the one order that is right: halo, then images of

@@ -77,7 +77,8 @@ fn c1_kernels_are_normalised() {
     let weights = [0.568_888_888_888_888_9, 0.478_628_670_499_366_47, 0.236_926_885_056_189_08];
     let integrate = |f: &dyn Fn(f64) -> f64, a: f64, b: f64| {
         let (mid, half) = (0.5 * (a + b), 0.5 * (b - a));
-        let point = |k: usize| weights[k] * (f(mid + half * nodes[k]) + if k > 0 { f(mid - half * nodes[k]) } else { 0.0 });
+        let point =
+            |k: usize| weights[k] * (f(mid + half * nodes[k]) + if k > 0 { f(mid - half * nodes[k]) } else { 0.0 });
         half * (0..3).map(point).sum::<f64>()
     };
     let sphere = [2.0, std::f64::consts::TAU, 2.0 * std::f64::consts::TAU];
@@ -117,9 +118,7 @@ fn c2_c3_c4_lattice_sums() {
         let mut neighbors = Neighbors::default();
         neighbors.build(&p, 2.0 * h);
         assert_eq!(neighbors.of_owned.of(centre).len() + 1, count, "neighbours, self included");
-        let w = |j: usize| {
-            K::KIND.norm(D) / h.powi(D as i32) * K::KIND.shape((p.x[centre] - p.x[j]).norm() / h)
-        };
+        let w = |j: usize| K::KIND.norm(D) / h.powi(D as i32) * K::KIND.shape((p.x[centre] - p.x[j]).norm() / h);
         let sum: f64 = (0..p.owned).map(w).sum();
         assert!((sum - unity).abs() < 1e-6, "partition of unity {sum}");
         let m11 = sweep_all::<D, N, S, K>(&p, h, 0.0).gradient[centre].0[0][0];

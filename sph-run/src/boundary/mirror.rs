@@ -31,9 +31,7 @@ impl Mirrors {
         for i in 0..particles.halo {
             let x = particles.x[i];
             let reach = reach(x);
-            let close = |plane: usize| {
-                self.planes[plane] && S::axis(plane).is_some_and(|axis| x.0[axis] < reach)
-            };
+            let close = |plane: usize| self.planes[plane] && S::axis(plane).is_some_and(|axis| x.0[axis] < reach);
             let near = u8::from(close(0)) | u8::from(close(1)) << 1;
             for planes in 1..=near {
                 if planes & near == planes {

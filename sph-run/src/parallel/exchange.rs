@@ -13,8 +13,11 @@ pub fn exchange(comm: &Communicator, peers: &[usize], outgoing: &[Vec<u64>]) -> 
         for (&peer, count) in peers.iter().zip(incoming_counts.iter_mut()) {
             requests.push(comm.process_at_rank(peer as i32).immediate_receive_into(scope, count));
         }
-        let sends: Vec<_> =
-            peers.iter().zip(&counts).map(|(&p, count)| comm.process_at_rank(p as i32).immediate_send(scope, count)).collect();
+        let sends: Vec<_> = peers
+            .iter()
+            .zip(&counts)
+            .map(|(&p, count)| comm.process_at_rank(p as i32).immediate_send(scope, count))
+            .collect();
         wait_all(requests);
         wait_all(sends);
     });
