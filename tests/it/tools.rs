@@ -44,8 +44,8 @@ fn last_snapshot(folder: &formats::folder::RunFolder) -> PathBuf {
     folder.out().join(name)
 }
 
-fn dump(tool: &str, file: &Path) -> Option<String> {
-    match Command::new(tool).arg("-h").arg(file).output() {
+fn dump(tool: &str, header_only: &str, file: &Path) -> Option<String> {
+    match Command::new(tool).arg(header_only).arg(file).output() {
         Err(_) => {
             eprintln!("LEFT OUT: {tool} is not installed");
             None
@@ -86,10 +86,10 @@ fn results_open_in_xarray_and_pass_the_cf_checker() {
 fn the_command_line_tools_of_hdf5_and_netcdf_read_them() {
     let work = WorkFolder::new();
     let folder = whole_run(&work, "run", &scene("axisymmetric"), 1);
-    if let Some(text) = dump("h5dump", &last_snapshot(&folder)) {
+    if let Some(text) = dump("h5dump", "-H", &last_snapshot(&folder)) {
         assert!(text.contains("VTKHDF") && text.contains("particles"), "{text}");
     }
-    if let Some(text) = dump("ncdump", &folder.post().join("results.nc")) {
+    if let Some(text) = dump("ncdump", "-h", &folder.post().join("results.nc")) {
         assert!(text.contains("t:units = \"s\"") && text.contains(":Conventions = \"CF-1.11\""), "{text}");
     }
 }
