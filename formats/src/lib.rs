@@ -1,7 +1,9 @@
 //! What is on disk, and the vocabulary to read it.
 //!
 //! The stages `sph-prep`, `sph-run` and `sph-post` never depend on each other: they meet in the files this crate
-//! reads and writes. It knows no time stepping and no neighbours, and no MPI outside [`h5`].
+//! reads and writes. It knows no time stepping and no neighbours. Files of particles are written, and can be read, by all
+//! ranks together: [`h5`], [`snapshot`] and [`checkpoint`] use MPI, and [`provenance`] asks for its version. All else is
+//! serial.
 
 pub mod checkpoint;
 pub mod disk;
@@ -9,6 +11,7 @@ pub mod exit;
 pub mod folder;
 pub mod h5;
 pub mod kernel;
+pub mod laws;
 pub mod lock;
 pub mod provenance;
 pub mod results;

@@ -208,21 +208,6 @@ pub fn read(path: &Path, name: &str) -> Result<Vec<f64>, FileError> {
     Ok(values.into_iter().map(|v| if v == FILL { f64::NAN } else { v }).collect())
 }
 
-/// Reads one global attribute of a result file as text; numbers are written out. Serial.
-///
-/// # Errors
-/// As [`read`].
-pub fn read_attribute(path: &Path, name: &str) -> Result<String, FileError> {
-    let file = open(path)?;
-    let missing = || FileError::wrong_kind(path, format!("it has no attribute {name}"));
-    let value = file.attribute(name).ok_or_else(missing)?.value();
-    match value.map_err(|error| FileError::damaged(path, error))? {
-        netcdf::AttributeValue::Str(text) => Ok(text),
-        netcdf::AttributeValue::Double(number) => Ok(number.to_string()),
-        other => Err(FileError::wrong_kind(path, format!("attribute {name} is {other:?}"))),
-    }
-}
-
 fn open(path: &Path) -> Result<netcdf::File, FileError> {
     std::fs::File::open(path).map_err(|error| FileError::reading(path, &error))?;
     netcdf::open(path).map_err(|error| FileError::wrong_kind(path, error))
@@ -255,8 +240,9 @@ mod tests {
         assert_eq!(height[4].to_bits(), (0.1_f64 + 0.2).to_bits());
         assert!(height[1].is_nan());
         assert_eq!(read(&path, "r0").unwrap(), [0.1]);
-        assert_eq!(read_attribute(&path, "Conventions").unwrap(), CONVENTIONS);
-        assert_eq!(read_attribute(&path, "spacing").unwrap(), "0.25");
+        let attribute = |name| open(&path).unwrap().attribute(name).unwrap().value().unwrap();
+        assert_eq!(attribute("Conventions"), netcdf::AttributeValue::Str(CONVENTIONS.into()));
+        assert_eq!(attribute("spacing"), netcdf::AttributeValue::Double(0.25));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file is left");
     }
 

@@ -46,6 +46,3 @@ impl Space {
         }
     }
 }
-
-/// Order of the six components of a symmetric tensor on disk, which is also VTK's: XX YY ZZ XY YZ XZ.
-pub const SYMMETRIC_ORDER: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];

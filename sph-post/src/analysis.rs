@@ -79,9 +79,7 @@ impl Analysis {
         let scene = Scene::read(&path.display().to_string(), &text)?;
         let hash = Scene::hash(&text);
         let files = files(folder, &hash)?;
-        let (_, start) = snapshot::read(&files[0])?;
-        let geometry = Geometry::new(&scene, &start);
-        drop(start);
+        let geometry = Geometry::new(&scene);
         let level = level.height(&geometry);
         let shown = spread(files.len(), PANELS);
         let mut moments = Vec::with_capacity(files.len());
@@ -98,9 +96,14 @@ impl Analysis {
         &self.moments[self.moments.len() - 1]
     }
 
-    /// Run-out relative to the start: (front - r0)/r0, or NaN with several bodies.
+    /// Run-out relative to the start: (front - r0)/r0, where r0 is the body's initial extent and the front is measured
+    /// from where it began. NaN where fronts don't say how far the body ran ([`Geometry::runs_outward`]): with several
+    /// bodies, with one that can spread both ways, and with one that runs towards -x.
     pub fn scaled(&self, front: f64) -> f64 {
-        self.geometry.extent.map_or(f64::NAN, |[begin, end]| (front - end) / (end - begin))
+        match self.geometry.extent {
+            Some([begin, end]) if self.geometry.runs_outward => (front - end) / (end - begin),
+            _ => f64::NAN,
+        }
     }
 }
 

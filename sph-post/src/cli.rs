@@ -7,6 +7,7 @@ use std::path::PathBuf;
 /// Evaluate a run: deposit, run-out, basal stresses, energies, and pictures of them.
 ///
 /// Works on the snapshots that are there, also while the run goes on; every call evaluates all of them anew.
+/// Serial: under mpirun one rank works and the others wait.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "sph-post", version, after_help = EXIT_CODES)]
 pub struct Arguments {
@@ -23,8 +24,9 @@ pub struct Arguments {
 const EXIT_CODES: &str = "\
 Exit codes:
    0  post/ is written; the paths are on standard output
-   2  the command line is wrong
+   2  the command line, or the scene in the run folder, is wrong
   65  no run, or one of its files is missing, damaged, or of another scene
+  70  the program failed: a bug
   73  post/ cannot be written";
 
 #[cfg(test)]

@@ -30,7 +30,8 @@ pub struct Map {
     pub height: Vec<f64>,
 }
 
-/// How far the material reaches from the axis, or from x = 0 along +x, m.
+/// How far the material reaches from the axis ([`formats::scene::Scene::is_radial`]), or from x = 0 along +x, m. What
+/// runs towards -x is not seen: where a body can do that, no run-out is taken from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fronts {
     /// The furthest particle, and half a spacing.

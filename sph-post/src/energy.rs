@@ -12,6 +12,8 @@ pub struct Energy {
     pub potential: f64,
     /// Sum of V sigma : C^-1 : sigma / 2, with the elastic constants of the material.
     pub elastic: f64,
+    /// Sum of m, kg.
+    pub mass: f64,
 }
 
 impl Energy {
@@ -20,6 +22,7 @@ impl Energy {
         let mut sum = Self::default();
         for row in 0..rows.len() {
             let (m, x, v, s) = (rows.mass[row], rows.position[row], rows.velocity[row], rows.stress[row]);
+            sum.mass += m;
             sum.kinetic += 0.5 * m * v.iter().map(|v| v * v).sum::<f64>();
             sum.potential -= m * (0..3).map(|a| g.gravity[a] * x[a]).sum::<f64>();
             let trace = s[0] + s[1] + s[2];
@@ -28,6 +31,11 @@ impl Energy {
             sum.elastic += m / rows.density[row] * density;
         }
         sum
+    }
+
+    /// What a potential energy of these particles is when it is measured from the floor instead of the origin, J.
+    pub fn above_floor(&self, g: &Geometry, potential: f64) -> f64 {
+        potential + self.mass * g.gravity[2] * g.floor
     }
 }
 
@@ -48,9 +56,20 @@ mod tests {
         let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
         close(e.kinetic, 0.5 * 2000.0 * 25.0);
         close(e.potential, 2000.0 * 9.81 * 0.5);
+        close(e.mass, 2000.0);
         close(e.elastic, 500.0 * 500.0 / (2.0 * 1e6));
         rows.stress.fill([0.0, 0.0, 0.0, 0.0, 0.0, 500.0]);
         let shear = 1e6 / 2.6;
         close(Energy::new(&g, &rows).elastic, 500.0 * 500.0 / (2.0 * shear));
+    }
+
+    #[test]
+    fn potential_energy_above_the_floor_does_not_depend_on_where_the_floor_is() {
+        for floor in [0.0, -3.0, 7.0] {
+            let g = Geometry { floor, ..geometry(Space::PlaneStrain, Kernel::CubicSpline, 0.1) };
+            let e = Energy::new(&g, &block(&g, [10, 1, 10]));
+            let above = e.above_floor(&g, e.potential);
+            assert!((above / (2000.0 * 9.81 * 0.5) - 1.0).abs() < 1e-12, "{floor}: {above}");
+        }
     }
 }

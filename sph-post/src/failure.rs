@@ -33,7 +33,8 @@ impl Failure {
     /// The exit code it leads to.
     pub fn exit_code(&self) -> i32 {
         match self {
-            Self::NoRun { .. } | Self::Scene(_) => exit::NO_INPUT,
+            Self::Scene(_) => exit::USAGE,
+            Self::NoRun { .. } => exit::NO_INPUT,
             Self::File(error) => error.exit_code(),
             Self::Picture { .. } => exit::CANNOT_WRITE,
         }

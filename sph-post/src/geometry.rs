@@ -3,7 +3,6 @@
 use formats::{
     kernel::Kernel,
     scene::{Body, Material, Scene, Shape},
-    snapshot::Rows,
     space::Space,
 };
 use std::f64::consts::PI;
@@ -39,6 +38,9 @@ pub struct Geometry {
     pub poisson: f64,
     /// The one body's extent along the profile: where it begins and ends, m. `None` with several bodies.
     pub extent: Option<[f64; 2]>,
+    /// Can the one body spread only outward: from the axis, or along +x from the plane of symmetry or the wall it starts
+    /// at? Else its fronts don't say how far it ran.
+    pub runs_outward: bool,
     /// Height of the highest body above the floor at the start, m.
     pub height: f64,
     /// Aspect ratio of a cylinder on the axis that starts at rest as the only body: for comparison with Lube et al.
@@ -46,20 +48,16 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// From the scene and the particles at the start (asked for the floor where the scene has none).
-    pub fn new(scene: &Scene, start: &Rows) -> Self {
-        let dx = scene.spacing;
-        let floors = scene.walls.iter().filter(|w| w.axis == 2 && w.side > 0.0).map(|w| w.at);
-        let lowest = start.position.iter().map(|x| x[2]).fold(f64::INFINITY, f64::min) - 0.5 * dx;
-        let floor = floors.reduce(f64::min).unwrap_or(if lowest.is_finite() { lowest } else { 0.0 });
-        let radial = match scene.space {
-            Space::PlaneStrain => false,
-            Space::Axisymmetric => true,
-            Space::ThreeD => scene.symmetry == [true; 2] || scene.bodies.iter().any(on_axis),
-        };
+    /// From the scene.
+    pub fn new(scene: &Scene) -> Self {
+        let (dx, floor, radial) = (scene.spacing, scene.floor(), scene.is_radial());
+        let mirrored = if scene.space == Space::Axisymmetric { [true, false] } else { scene.symmetry };
+        let walls = [(1.0, f64::NEG_INFINITY), (-1.0, f64::INFINITY)]
+            .map(|(side, none)| scene.walls.iter().find(|w| w.axis == 0 && w.side == side).map_or(none, |w| w.at));
         let Material::DruckerPrager(law) = &scene.material;
         let single = if let [body] = &scene.bodies[..] { Some(body) } else { None };
-        let top = scene.bodies.iter().map(|b| bounds(&b.shape).1[2]).fold(f64::NEG_INFINITY, f64::max);
+        let extent = single.map(|b| extent(b, scene.space, radial || mirrored[0]));
+        let top = scene.bodies.iter().map(|b| b.shape.bounds(scene.space).1[2]).fold(f64::NEG_INFINITY, f64::max);
         Self {
             space: scene.space,
             kernel: scene.kernel,
@@ -67,18 +65,23 @@ impl Geometry {
             h: scene.h(),
             gravity: scene.gravity,
             floor,
-            mirrored: if scene.space == Space::Axisymmetric { [true, false] } else { scene.symmetry },
-            walls: [(1.0, f64::NEG_INFINITY), (-1.0, f64::INFINITY)]
-                .map(|(side, none)| scene.walls.iter().find(|w| w.axis == 0 && w.side == side).map_or(none, |w| w.at)),
+            mirrored,
+            walls,
             radial,
             width: width(scene),
             density: law.density,
             young: law.young,
             poisson: law.poisson,
-            extent: single.map(|b| extent(b, radial)),
+            extent,
+            runs_outward: single.zip(extent).is_some_and(|(body, [begin, _])| {
+                let left = if radial || mirrored[0] { 0.0 } else { walls[0] };
+                (begin - left).abs() <= 0.5 * dx && runs_right(body, radial)
+            }),
             height: (top - floor).max(0.0),
             cylinder_aspect: single.and_then(|b| match b.shape {
-                Shape::Cylinder { radius, height, .. } if on_axis(b) && b.velocity == [0.0; 3] => Some(height / radius),
+                Shape::Cylinder { radius, height, .. } if b.is_cylinder_on_axis() && b.velocity == [0.0; 3] => {
+                    Some(height / radius)
+                }
                 _ => None,
             }),
         }
@@ -135,28 +138,20 @@ impl Geometry {
     }
 }
 
-fn on_axis(body: &Body) -> bool {
-    matches!(body.shape, Shape::Cylinder { base, .. } if base[0] == 0.0 && base[1] == 0.0)
+/// Where a body begins and ends along the profile; `cut` at the axis or the plane of symmetry.
+fn extent(body: &Body, space: Space, cut: bool) -> [f64; 2] {
+    let (low, high) = body.shape.bounds(space);
+    [if cut { low[0].max(0.0) } else { low[0] }, high[0]]
 }
 
-/// Lower and upper corner of a shape, m.
-fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {
-    match *shape {
-        Shape::Cylinder { base: b, radius: r, height } => {
-            ([b[0] - r, b[1] - r, b[2]], [b[0] + r, b[1] + r, b[2] + height])
-        }
-        Shape::Box { min, max } => (min, max),
-        Shape::Wedge { corner: c, size: s, falls_left } => {
-            let (low, high) = if falls_left { (c[0] - s[0], c[0]) } else { (c[0], c[0] + s[0]) };
-            ([low, c[1], c[2]], [high, c[1] + s[1], c[2] + s[2]])
-        }
+/// Does a body whose left side is held run out to the right? A wedge that falls to the left runs the other way, and a
+/// cylinder only touches what it leans on: it runs around.
+fn runs_right(body: &Body, radial: bool) -> bool {
+    match body.shape {
+        Shape::Cylinder { .. } => radial,
+        Shape::Box { .. } => true,
+        Shape::Wedge { falls_left, .. } => !falls_left,
     }
-}
-
-/// Where a body begins and ends along the profile.
-fn extent(body: &Body, radial: bool) -> [f64; 2] {
-    let (low, high) = bounds(&body.shape);
-    if radial { [low[0].max(0.0), high[0]] } else { [low[0], high[0]] }
 }
 
 /// Extent of the material along y: between two walls, or that of the bodies.
@@ -164,7 +159,7 @@ fn width(scene: &Scene) -> f64 {
     if scene.space != Space::ThreeD {
         return 1.0;
     }
-    let boxes = || scene.bodies.iter().map(|b| bounds(&b.shape));
+    let boxes = || scene.bodies.iter().map(|b| b.shape.bounds(scene.space));
     let mut low = boxes().map(|b| b.0[1]).fold(f64::INFINITY, f64::min);
     let mut high = boxes().map(|b| b.1[1]).fold(f64::NEG_INFINITY, f64::max);
     for wall in scene.walls.iter().filter(|w| w.axis == 1) {

@@ -1,6 +1,6 @@
 //! `sph-post`: from the snapshots of a run to numbers (`post/results.nc`, `post/history.nc`) and pictures.
 //!
-//! Serial: one snapshot is in memory at a time. [`geometry`] says what the scene means for the evaluation,
+//! Serial: one snapshot is in memory at a time, and of several ranks one works. [`geometry`] says what the scene means for the evaluation,
 //! [`sample`] gives fields at any point, [`deposit`], [`basal`] and [`energy`] evaluate one snapshot,
 //! [`analysis`] goes through the run, [`netcdf`], [`plot`] and [`report`] show what it found.
 
@@ -26,10 +26,31 @@ use clap::Parser;
 use cli::Arguments;
 use failure::Failure;
 use formats::{exit, folder::RunFolder, snapshot::FileError};
-use std::{ffi::OsString, path::PathBuf};
+use mpi::{topology::SimpleCommunicator, traits::Communicator as _};
+use std::{ffi::OsString, io::Write as _, path::PathBuf};
 
-/// Runs the whole stage and returns the exit code.
+/// Runs the whole stage and returns the exit code. MPI is set up and wound up within: of several ranks the first one works
+/// and speaks, the others wait and return [`exit::DONE`].
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> i32 {
+    let Some(universe) = mpi::initialize() else {
+        say(format_args!("sph-post: error: MPI is running already; it can be started only once\n"));
+        return exit::NUMERICAL;
+    };
+    abort_all_ranks_on_panic();
+    if universe.world().rank() == 0 { work(arguments) } else { exit::DONE }
+}
+
+/// A rank that panics while others wait for it would hang the job.
+fn abort_all_ranks_on_panic() {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        report(panic);
+        SimpleCommunicator::world().abort(exit::NUMERICAL);
+    }));
+}
+
+/// What rank 0 does.
+fn work(arguments: impl IntoIterator<Item = OsString>) -> i32 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(message) => {
@@ -40,14 +61,21 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> i32 {
     };
     match evaluate(&arguments) {
         Ok(paths) => {
-            paths.iter().for_each(|path| println!("{}", path.display()));
+            let mut out = std::io::stdout().lock();
+            // Whoever closed the pipe wants no more paths; the files are there all the same.
+            let _ = paths.iter().try_for_each(|path| writeln!(out, "{}", path.display())).and_then(|()| out.flush());
             exit::DONE
         }
         Err(failure) => {
-            eprintln!("sph-post: error: {failure}");
+            say(format_args!("sph-post: error: {failure}\n"));
             failure.exit_code()
         }
     }
+}
+
+/// Writes to standard error, if anybody listens.
+fn say(message: std::fmt::Arguments<'_>) {
+    let _ = std::io::stderr().write_fmt(message);
 }
 
 /// Evaluates the run and returns the paths of what it wrote.
@@ -66,7 +94,7 @@ fn evaluate(arguments: &Arguments) -> Result<Vec<PathBuf>, Failure> {
     paths.extend(summary::write(&analysis, &post)?);
     paths.extend(plot::pictures(&analysis, &post)?);
     if !arguments.quiet {
-        eprint!("{}", report::table(&analysis));
+        say(format_args!("{}", report::table(&analysis)));
     }
     Ok(paths)
 }

@@ -2,13 +2,15 @@
 
 use crate::{
     analysis::{Analysis, Moment},
+    deposit::Fronts,
     history::History,
 };
 use formats::results::{Dataset, Role, Variable};
 
 /// What the methods are taken from.
 const REFERENCES: &str = "Surface: filled fraction sum(V W) = 1/2. Interpolation: first-order weighted least squares \
-(Liu and Liu 2003). Reference run-out: Lube et al. 2004, J. Fluid Mech. 508, 175-199";
+(Liu and Liu 2003). Reference run-out and height: Lube et al. 2004, J. Fluid Mech. 508, 175-199, through Yang et al. 2020, \
+Eqs 45 and 46, of whose two heights the lower is taken";
 
 /// `post/results.nc`: everything the snapshots show, over time `t`.
 pub fn results(a: &Analysis) -> Dataset {
@@ -104,15 +106,17 @@ fn series(a: &Analysis, d: &mut Dataset) {
         let values = a.moments.iter().map(value).collect();
         d.variable(Variable::new(name, Role::Data, &["t"], long, unit, values));
     };
-    add("front_furthest", "run-out: furthest particle and half a spacing", "m", &|m| m.deposit.fronts.furthest);
-    add("front_mass", "run-out: contains 99.5 percent of the mass", "m", &|m| m.deposit.fronts.mass);
-    add("front_thickness", "run-out: edge where the thickness is half a spacing", "m", &|m| m.deposit.fronts.thickness);
-    if a.geometry.extent.is_some() {
-        let scaled = "relative to the initial extent, (front - r0)/r0";
-        let f = |m: &Moment| m.deposit.fronts;
-        add("runout_furthest", &format!("furthest particle, {scaled}"), "1", &|m| a.scaled(f(m).furthest));
-        add("runout_mass", &format!("99.5 percent of the mass, {scaled}"), "1", &|m| a.scaled(f(m).mass));
-        add("runout_thickness", &format!("thickness of half a spacing, {scaled}"), "1", &|m| a.scaled(f(m).thickness));
+    let from = if a.geometry.radial { "distance from the axis" } else { "place along +x, from x = 0" };
+    let scaled = "relative to the initial extent, (front - r0)/r0; missing with several bodies, and where the body can \
+                  spread both ways or runs towards -x";
+    for (name, what, pick) in [
+        ("furthest", "furthest particle and half a spacing", (|f| f.furthest) as fn(&Fronts) -> f64),
+        ("mass", "contains 99.5 percent of the mass", |f| f.mass),
+        ("thickness", "edge where the thickness is half a spacing", |f| f.thickness),
+    ] {
+        add(&format!("front_{name}"), &format!("front, {from}: {what}"), "m", &|m| pick(&m.deposit.fronts));
+        let value = |m: &Moment| a.scaled(pick(&m.deposit.fronts));
+        add(&format!("runout_{name}"), &format!("run-out: {what}, {scaled}"), "1", &value);
     }
     add("height_centre", "largest height within two spacings of the centre", "m", &|m| m.deposit.height_centre);
     add("height_max", "largest height of the surface", "m", &|m| m.deposit.height_max);
@@ -225,9 +229,15 @@ mod tests {
 
     #[test]
     fn units_are_spelt_as_cf_wants() {
-        for (ours, cf) in
-            [("m/s", "m s-1"), ("kg/m3", "kg m-3"), ("1", "1"), ("1/s", "s-1"), ("J", "J"), ("m/s2", "m s-2")]
-        {
+        for (ours, cf) in [
+            ("m/s", "m s-1"),
+            ("J/m", "J m-1"),
+            ("kg/m3", "kg m-3"),
+            ("1", "1"),
+            ("1/s", "s-1"),
+            ("J", "J"),
+            ("m/s2", "m s-2"),
+        ] {
             assert_eq!(cf_unit(ours), cf);
         }
     }

@@ -1,11 +1,16 @@
 //! The final state as a few numbers and a curve, for scripts: `post/summary.json` and `post/profile_final.csv`.
 
-use crate::analysis::Analysis;
+use crate::analysis::{Analysis, Moment};
 use crate::failure::Failure;
 use formats::disk;
 use std::path::{Path, PathBuf};
 
-/// Writes both files and returns their paths. Lengths in m; what the scene has no meaning for is null.
+/// Writes both files and returns their paths. Lengths in m; what has no meaning for the scene is null: run-outs where
+/// [`Analysis::scaled`] gives none, r0 with several bodies.
+///
+/// Whether it has come to rest: `front_mass_last_T` is the change of the 99.5 % front during the last T = sqrt(H0/g), in
+/// r0, null where run-outs are or the run is shorter than T; `kinetic_over_peak` is the kinetic energy at the end over its
+/// peak. Both come from the history where there is one, since it is finer than the snapshots.
 ///
 /// # Errors
 /// Whatever can't be written.
@@ -34,9 +39,45 @@ fn json(a: &Analysis) -> serde_json::Value {
         "final_height_m": last.deposit.height_centre,
         "max_height_m": last.deposit.height_max,
         "volume_ratio": last.deposit.volume_ratio,
+        "front_mass_last_T": front_last(a),
+        "kinetic_over_peak": kinetic_over_peak(a),
         "basal_level_m": a.level,
         "basal_force_over_weight": last.basal.ratio(),
     })
+}
+
+/// A quantity over time: from a column of the history, else from the snapshots.
+fn series(a: &Analysis, column: &str, of: impl Fn(&Moment) -> f64) -> Vec<[f64; 2]> {
+    match a.history.as_ref().and_then(|h| Some((h.times(), h.column(column)?))) {
+        Some((times, values)) => times.iter().zip(values).map(|(&t, &v)| [t, v]).collect(),
+        None => a.moments.iter().map(|m| [m.time, of(m)]).collect(),
+    }
+}
+
+/// NaN where it has no meaning.
+fn front_last(a: &Analysis) -> f64 {
+    let fronts = series(a, "front_mass_99_5", |m| m.deposit.fronts.mass);
+    let (Some(period), Some(&[end, last])) = (a.geometry.time_scale(), fronts.last()) else { return f64::NAN };
+    a.scaled(last) - a.scaled(at(&fronts, end - period))
+}
+
+/// Linear between the points, which ascend in time; NaN before the first.
+fn at(points: &[[f64; 2]], time: f64) -> f64 {
+    let after = points.partition_point(|p| p[0] < time);
+    match points[after.saturating_sub(1)..] {
+        [before, next, ..] if after > 0 => {
+            before[1] + (next[1] - before[1]) * (time - before[0]) / (next[0] - before[0])
+        }
+        [first, ..] if first[0] == time => first[1],
+        _ => f64::NAN,
+    }
+}
+
+/// NaN where nothing ever moved.
+fn kinetic_over_peak(a: &Analysis) -> f64 {
+    let energies = series(a, "kinetic_energy", |m| m.energy.kinetic);
+    let peak = energies.iter().fold(0.0_f64, |peak, e| peak.max(e[1]));
+    energies.last().map_or(f64::NAN, |e| e[1] / peak)
 }
 
 fn profile(a: &Analysis) -> String {
@@ -47,4 +88,16 @@ fn profile(a: &Analysis) -> String {
         format!("{at:e},{:e}\n", if height.is_nan() { 0.0 } else { height })
     });
     format!("{name}_m,h_m\n{}", rows.collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_series_is_linear_between_its_points() {
+        let points = [[1.0, 5.0], [2.0, 7.0], [4.0, 3.0]];
+        assert_eq!([1.0, 1.5, 2.0, 3.0, 4.0].map(|t| at(&points, t)), [5.0, 6.0, 7.0, 5.0, 3.0]);
+        assert!(at(&points, 0.9).is_nan() && at(&points, 4.1).is_nan() && at(&[], 0.0).is_nan());
+    }
 }

@@ -22,6 +22,7 @@ pub fn geometry(space: Space, kernel: Kernel, dx: f64) -> Geometry {
         young: 1e6,
         poisson: 0.3,
         extent: None,
+        runs_outward: false,
         height: 0.1,
         cylinder_aspect: None,
     }

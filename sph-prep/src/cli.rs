@@ -22,8 +22,9 @@ pub struct Arguments {
 const EXIT_CODES: &str = "\
 Exit codes:
    0  the run folder is ready; its path is on standard output
-   2  the command line or the scene is wrong
+   2  the command line or the scene is wrong, or the scene needs more memory than there is
   65  the scene file is missing or not a text file
+  70  a bug: the program has panicked
   73  the run folder cannot be written, or is not empty";
 
 #[cfg(test)]

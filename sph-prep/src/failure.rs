@@ -18,6 +18,18 @@ pub enum Failure {
     /// The scene is wrong.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The scene needs more memory than there is.
+    #[error("about {particles} particles need {needed} of memory, {available} are available; {advice}")]
+    TooLarge {
+        /// Estimated number of particles.
+        particles: u64,
+        /// Memory `sph-run` would need, all ranks together.
+        needed: String,
+        /// Memory available to all ranks.
+        available: String,
+        /// What would fit.
+        advice: String,
+    },
     /// The run folder can't be made.
     #[error("{}: {why}", path.display())]
     Output {
@@ -39,7 +51,7 @@ impl Failure {
     pub fn exit_code(&self) -> i32 {
         match self {
             Self::NoScene { .. } => exit::NO_INPUT,
-            Self::Scene(_) => exit::USAGE,
+            Self::Scene(_) | Self::TooLarge { .. } => exit::USAGE,
             Self::Output { .. } => exit::CANNOT_WRITE,
             Self::File(error) => error.exit_code(),
             Self::Elsewhere(code) => *code,

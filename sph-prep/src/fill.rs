@@ -79,7 +79,7 @@ impl Plan {
                         rows.velocity.push(scene.bodies[body].velocity);
                         rows.mass.push(scene.material.density() * lattice.volume(column));
                         rows.density.push(scene.material.density());
-                        rows.stress.push(stress.at(lattice, position));
+                        rows.stress.push(stress.at(&self.lattices, [column.x, column.y], position[2]));
                         rows.plastic_strain.push(0.0);
                     }
                 }

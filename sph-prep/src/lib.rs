@@ -1,12 +1,14 @@
 //! `sph-prep`: from a scene to the particles a run starts with, on any number of ranks.
 //!
 //! Rank 0 reads the scene and speaks; every rank checks it, makes its share of the particles, and writes it into the
-//! one file of all ranks. Failures are agreed upon after each part, so that all ranks leave together.
+//! one file of all ranks. What the run costs is told, and refused, before anything is allocated. Failures are agreed upon after each part, so that all ranks leave together.
 
+pub mod advice;
 pub mod cli;
 pub mod failure;
 pub mod fill;
 pub mod initial;
+pub mod memory;
 pub mod output;
 pub mod shape;
 pub mod summary;
@@ -26,18 +28,19 @@ use formats::{
     schema::Kept,
     snapshot::{self, Header, Rows},
 };
+use memory::Load;
 use mpi::{collective::SystemOperation, topology::SimpleCommunicator, traits::*};
 use output::Staging;
-use std::{ffi::OsString, os::unix::ffi::OsStringExt, path::PathBuf};
+use std::{ffi::OsString, io::Write, os::unix::ffi::OsStringExt, path::PathBuf};
 
-/// Exit code of a panic, as Rust has it: a bug, none of [`exit`].
-const PANIC: i32 = 101;
+/// Exit code of a panic, as in `sph-run`.
+const PANIC: i32 = exit::NUMERICAL;
 
 /// Runs the whole stage and returns the exit code, the same on all ranks. MPI is set up and wound up within.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> i32 {
     let Some(universe) = mpi::initialize() else {
-        eprintln!("sph-prep: MPI is running already; it can be started only once");
-        return PANIC;
+        text::say("sph-prep: error: MPI is running already; it can be started only once\n");
+        return exit::USAGE;
     };
     // One rank that unwinds would leave the others waiting for ever.
     let print = std::panic::take_hook();
@@ -61,7 +64,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> i32 {
     match prepare(&arguments, &world, &mut text) {
         Ok(()) => {
             if talks {
-                println!("{}", arguments.output.display());
+                // A closed pipe does not undo the run folder.
+                let _ = writeln!(std::io::stdout(), "{}", arguments.output.display());
             }
             exit::DONE
         }
@@ -82,7 +86,7 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
     let talks = comm.rank() == 0;
     let says = |message: String| {
         if talks && !arguments.quiet {
-            eprint!("{message}");
+            text::say(&message);
         }
     };
     *text = text::share(&arguments.scene, comm)?;
@@ -91,19 +95,27 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
     let staging = if talks { Staging::new(&arguments.output).map(Some) } else { Ok(None) };
     let staging = agree(comm, staging)?;
 
+    let ranks = comm.size() as u64;
+    let lattices = fill::lattices(&scene);
+    let estimate = Load::of(&scene, &lattices);
+    if let Err(failure) = memory::check(&scene, estimate, memory::room(comm), ranks) {
+        // Even counting would take too long.
+        says(summary::head(&scene, &summary::estimated(&scene, &lattices)));
+        says(summary::cost(&scene, estimate, ranks));
+        return Err(failure);
+    }
+
     let plan = Plan::new(&scene, comm);
     let bodies = bodies(&scene, &plan, comm);
     if let Some(empty) = bodies.iter().find(|b| b.particles == 0) {
         return Err(no_particles(arguments, text, &empty.name).into());
     }
     says(summary::head(&scene, &bodies));
+    says(summary::cost(&scene, Load { particles: plan.total(), ..estimate }, ranks));
     if talks {
-        eprint!("{}", summary::warnings(&bodies));
+        text::say(&advice::warnings(&scene, &plan.lattices, &bodies));
     }
-    let rows = plan.particles(&scene, snapshot::share(plan.total(), comm.rank() as u64, comm.size() as u64));
-    let walls = wall::within_reach(&scene, &rows, comm);
-    says(summary::cost(&scene, plan.total(), walls, comm.size()));
-
+    let rows = plan.particles(&scene, snapshot::share(plan.total(), comm.rank() as u64, ranks));
     write(&scene, text, &rows, plan.total(), staging, comm)
 }
 

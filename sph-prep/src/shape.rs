@@ -117,6 +117,55 @@ impl Lattice {
         }
     }
 
+    /// Lower and upper surface of the body above a place of its foot, m above z = 0; none where it does not stand.
+    pub fn vertical_extent(&self, x: f64, y: f64) -> Option<(f64, f64)> {
+        let three = self.space == Space::ThreeD;
+        let across = |low: f64, high: f64| !three || (low..high).contains(&y);
+        let stands = match self.shape {
+            Shape::Cylinder { base, radius, .. } if three => (x - base[0]).hypot(y - base[1]) < radius,
+            Shape::Cylinder { radius, .. } => x < radius,
+            Shape::Box { min, max } => (min[0]..max[0]).contains(&x) && across(min[1], max[1]),
+            Shape::Wedge { corner, size, falls_left } => {
+                let along = if falls_left { corner[0] - x } else { x - corner[0] };
+                (0.0..size[0]).contains(&along) && across(corner[1], corner[1] + size[1])
+            }
+        };
+        stands.then(|| (self.origin[2], self.top(x)))
+    }
+
+    /// Lower and upper corner of the box around the shape, the part on the positive side of the planes of symmetry, m.
+    pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
+        let (mut low, mut high) = match self.shape {
+            Shape::Cylinder { base: [x, y, z], radius, height } => {
+                ([x - radius, y - radius, z], [x + radius, y + radius, z + height])
+            }
+            Shape::Box { min, max } => (min, max),
+            Shape::Wedge { corner: [x, y, z], size, falls_left } => {
+                let start = if falls_left { x - size[0] } else { x };
+                ([start, y, z], [start + size[0], y + size[1], z + size[2]])
+            }
+        };
+        let axis = self.space == Space::Axisymmetric;
+        for side in 0..2 {
+            if self.symmetry[side] || (axis && side == 0) {
+                low[side] = low[side].max(0.0);
+                high[side] = high[side].max(0.0);
+            }
+        }
+        (low, high)
+    }
+
+    /// About how many particles the body holds, without counting: its volume over that of a cell.
+    pub fn estimate(&self) -> u64 {
+        let cells = match self.space {
+            Space::ThreeD => self.ideal_volume() / self.spacing.powi(3),
+            Space::PlaneStrain => self.ideal_volume() / self.spacing.powi(2),
+            // Of rings the section counts, and there are rectangles only.
+            Space::Axisymmetric => (self.columns() * self.whole(self.height())) as f64,
+        };
+        cells.round() as u64
+    }
+
     /// Volume of a particle of this column: m3, m2 in plane strain (per metre of depth), of the whole ring in the
     /// axisymmetric space.
     pub fn volume(&self, column: Column) -> f64 {
@@ -248,6 +297,28 @@ mod tests {
         assert_eq!(plane.column(3).y, 0.0);
         let rings = Lattice::new(&scene(Space::Axisymmetric, 0.01, shape), 0);
         assert!((rings.ideal_volume() / (PI * (0.304f64.powi(2) - 0.01) * 0.1) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn every_column_stands_on_the_foot() {
+        let shapes = [
+            cylinder([0.3, -0.2, 1.0]),
+            Shape::Box { min: [0.1, -0.1, 0.5], max: [0.304, 0.106, 0.6] },
+            Shape::Wedge { corner: [0.5, 0.0, 0.1], size: [0.4, 0.1, 0.2], falls_left: true },
+            Shape::Wedge { corner: [0.5, 0.0, 0.1], size: [0.4, 0.1, 0.2], falls_left: false },
+        ];
+        for shape in shapes {
+            let lattice = Lattice::new(&scene(Space::ThreeD, 0.01, shape.clone()), 0);
+            let (low, high) = lattice.bounds();
+            for column in (0..lattice.columns()).map(|c| lattice.column(c)).filter(|c| c.cells > 0) {
+                let (bottom, top) = lattice.vertical_extent(column.x, column.y).unwrap();
+                assert!(bottom < lattice.z(0) && lattice.z(column.cells - 1) < top, "{shape:?}");
+                assert!(low[0] < column.x && column.x < high[0] && low[1] < column.y && column.y < high[1]);
+            }
+            assert_eq!(lattice.vertical_extent(low[0] - 0.01, 0.5 * (low[1] + high[1])), None);
+            assert_eq!(lattice.vertical_extent(0.5 * (low[0] + high[0]), high[1] + 0.01), None);
+            assert!((lattice.estimate() as f64 / count(&lattice) as f64 - 1.0).abs() < 0.06, "{shape:?}");
+        }
     }
 
     #[test]

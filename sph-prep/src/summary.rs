@@ -1,14 +1,10 @@
 //! What the user is told before anything is written.
 
-use crate::shape::Lattice;
+use crate::{memory::Load, shape::Lattice};
 use formats::{scene::Scene, space::Space};
 
-/// Memory `sph-run` needs for a particle, virtual ones included, bytes: state, rates, neighbour list and buffers of
-/// the halo. An estimate.
-pub const BYTES_PER_PARTICLE: u64 = 1000;
-
-/// A body's volume may differ from its lattice's by so much, per cent, before a warning.
-pub const TOLERATED_DEVIATION: f64 = 2.0;
+/// Whole numbers of intervals may be off by so much.
+const ROUNDING: f64 = 1e-9;
 
 /// A body in numbers.
 #[derive(Clone, Debug)]
@@ -41,6 +37,13 @@ pub fn bodies(scene: &Scene, lattices: &[Lattice], particles: &[u64], discrete: 
     (0..lattices.len()).map(one).collect()
 }
 
+/// Bodies in numbers, where there are too many particles to count.
+pub fn estimated(scene: &Scene, lattices: &[Lattice]) -> Vec<Body> {
+    let particles: Vec<_> = lattices.iter().map(Lattice::estimate).collect();
+    let volumes: Vec<_> = lattices.iter().map(Lattice::ideal_volume).collect();
+    bodies(scene, lattices, &particles, &volumes)
+}
+
 /// The scene and its bodies; printed before the particles are made, so that a slip in the spacing shows before it
 /// eats the memory.
 pub fn head(scene: &Scene, bodies: &[Body]) -> String {
@@ -65,53 +68,51 @@ pub fn head(scene: &Scene, bodies: &[Body]) -> String {
     out
 }
 
-/// Warnings about the bodies, one a line.
-pub fn warnings(bodies: &[Body]) -> String {
-    let mut out = String::new();
-    for body in bodies.iter().filter(|b| b.deviation().abs() > TOLERATED_DEVIATION) {
-        let (name, deviation) = (&body.name, body.deviation());
-        let advice = "choose a spacing that divides its sizes, or a finer one";
-        out += &format!("warning: body {name}: the volume of its particles is off by {deviation:+.1} %; {advice}\n");
-    }
-    out
-}
-
 /// What the run will cost.
-pub fn cost(scene: &Scene, particles: u64, walls: u64, ranks: i32) -> String {
+pub fn cost(scene: &Scene, load: Load, ranks: u64) -> String {
     let mut out = String::new();
     let mut line = |name: &str, text: String| out += &format!("{name:<12} {text}\n");
-    line("walls", format!("about {walls} virtual particles within reach at the start"));
-    let bytes = memory(particles, walls);
-    line("memory", format!("about {} for sph-run, all ranks together", size(bytes)));
+    line("walls", format!("about {} virtual particles within reach at the start", load.walls));
+    let plural = if ranks == 1 { "" } else { "s" };
+    line("memory", format!("about {} for sph-run on {ranks} rank{plural}, all together", size(load.bytes(ranks))));
     let (dt, steps) = time_step(scene);
     line("sound speed", format!("{} m/s", short(scene.material.sound_speed())));
     line("time step", format!("about {} s, {steps} steps to {} s", short(dt), short(scene.end.time)));
     line("snapshots", format!("{}, every {} s", snapshots(scene), short(scene.output.snapshots)));
-    line("prepared on", format!("{ranks} rank{}", if ranks == 1 { "" } else { "s" }));
+    line("prepared on", format!("{ranks} rank{plural}"));
     out
 }
 
-/// Bytes `sph-run` is expected to need.
-pub fn memory(particles: u64, walls: u64) -> u64 {
-    (particles + walls) * BYTES_PER_PARTICLE
-}
-
-/// The first time step, s, and the number of such steps to the end.
+/// The first time step, s, and the number of such steps to the end. Steps are shortened to meet each line of the
+/// history and each snapshot, so that every stretch between two of them takes a whole number of steps.
 pub fn time_step(scene: &Scene) -> (f64, u64) {
     let speed = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
     let fastest = scene.bodies.iter().map(|b| speed(b.velocity)).fold(0.0, f64::max);
     let dt = scene.numerics.courant * scene.h() / (scene.material.sound_speed() + fastest);
-    (dt, (scene.end.time / dt).ceil() as u64)
+    let end = scene.end.time;
+    let steps = |stretch: f64| (stretch / dt - ROUNDING).ceil().max(0.0);
+    let (fine, coarse) = (
+        scene.output.history.min(scene.output.snapshots).min(end),
+        scene.output.history.max(scene.output.snapshots).min(end),
+    );
+    let whole = (end / fine + ROUNDING).floor();
+    let mut count = whole * steps(fine) + steps(end - whole * fine);
+    // Coarse events that fall between the fine ones cut one more step each.
+    let ratio = coarse / fine;
+    if (ratio - ratio.round()).abs() > 1e-6 {
+        count += (end / coarse - ROUNDING).floor();
+    }
+    (dt, count as u64)
 }
 
 /// Number of snapshots, the first and the last included.
 pub fn snapshots(scene: &Scene) -> u64 {
     // A hair more than a whole number of intervals is a whole number.
-    (scene.end.time / scene.output.snapshots - 1e-9).ceil() as u64 + 1
+    (scene.end.time / scene.output.snapshots - ROUNDING).ceil() as u64 + 1
 }
 
 /// A number to five digits, without trailing zeros.
-fn short(x: f64) -> String {
+pub(crate) fn short(x: f64) -> String {
     if x != 0.0 && !(1e-3..1e6).contains(&x.abs()) {
         let text = format!("{x:.4e}");
         let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
@@ -125,7 +126,8 @@ fn trimmed(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
-fn size(bytes: u64) -> String {
+/// A number of bytes to the reader's scale.
+pub(crate) fn size(bytes: u64) -> String {
     let mut value = bytes as f64;
     for unit in ["B", "kB", "MB", "GB"] {
         if value < 1000.0 {
@@ -153,24 +155,34 @@ mod tests {
     }
 
     #[test]
-    fn a_coarse_body_is_warned_of() {
-        let body = |discrete| Body { name: "heap".into(), particles: 1, ideal: 1.0, discrete };
-        assert_eq!(warnings(&[body(1.019), body(0.981)]), "");
-        let warned = warnings(&[body(0.97)]);
-        assert!(warned.contains("heap") && warned.contains("-3.0 %"), "{warned}");
-    }
-
-    #[test]
     fn the_time_step_follows_the_fastest_body() {
         let mut scene = scene(Space::PlaneStrain, 0.01, Shape::Box { min: [0.0; 3], max: [0.1, 0.0, 0.1] });
         let c = scene.material.sound_speed();
         let (dt, steps) = time_step(&scene);
         assert!((dt - 0.6 * 0.012 / c).abs() < 1e-15);
-        assert_eq!(steps, (1.0 / dt).ceil() as u64);
+        // 100 lines of the history, which all snapshots fall on.
+        assert_eq!(steps, 100 * (0.01 / dt).ceil() as u64);
         scene.bodies[0].velocity = [3.0, 0.0, 4.0];
         assert!((time_step(&scene).0 - 0.6 * 0.012 / (c + 5.0)).abs() < 1e-15);
         assert_eq!(snapshots(&scene), 21);
         scene.output.snapshots = 0.3;
         assert_eq!(snapshots(&scene), 5);
+    }
+
+    #[test]
+    fn events_shorten_steps() {
+        let mut scene = scene(Space::PlaneStrain, 0.01, Shape::Box { min: [0.0; 3], max: [0.1, 0.0, 0.1] });
+        let (dt, _) = time_step(&scene);
+        let mut count = |history: f64, snapshots: f64, end: f64| {
+            scene.output.history = history * dt;
+            scene.output.snapshots = snapshots * dt;
+            scene.end.time = end * dt;
+            time_step(&scene).1
+        };
+        assert_eq!(count(10.0, 100.0, 100.0), 100);
+        assert_eq!(count(9.5, 95.0, 95.0), 100);
+        assert_eq!(count(0.1, 1.0, 10.0), 100, "at least a step an event");
+        assert_eq!(count(10.0, 25.0, 100.0), 103, "at 25, 75 and, for want of looking closer, 50");
+        assert_eq!(count(40.0, 40.0, 100.5), 101);
     }
 }

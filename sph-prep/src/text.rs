@@ -4,7 +4,10 @@ use crate::failure::{Failure, agree};
 use formats::scene::SceneError;
 use miette::{GraphicalReportHandler, LabeledSpan, MietteDiagnostic, NamedSource, Report, SourceOffset};
 use mpi::traits::*;
-use std::{io::IsTerminal, path::Path};
+use std::{
+    io::{IsTerminal, Write},
+    path::Path,
+};
 
 /// Reads a file on rank 0 and hands its text to all ranks. Collective.
 ///
@@ -39,18 +42,23 @@ fn read(path: &Path) -> Result<String, Failure> {
     })
 }
 
+/// Prints to standard error. That nobody listens any more is no failure.
+pub fn say(message: &str) {
+    let _ = std::io::stderr().write_all(message.as_bytes());
+}
+
 /// Prints a failure to standard error. The faults of a scene come one a line; on a terminal each is followed by the
 /// lines of the scene it is about.
 pub fn print(failure: &Failure, text: &str) {
     match failure {
         Failure::Scene(error) => {
-            eprintln!("{}", error.report());
+            say(&format!("{}\n", error.report()));
             if std::io::stderr().is_terminal() {
-                eprint!("{}", excerpts(error, text));
+                say(&excerpts(error, text));
             }
         }
         // Rank 0 prints even if only another rank knows the reason.
-        other => eprintln!("sph-prep: {other}"),
+        other => say(&format!("sph-prep: error: {other}\n")),
     }
 }
 

@@ -251,6 +251,39 @@ fn the_summary_is_printed_once_and_can_be_silenced() {
 }
 
 #[test]
+fn warnings_are_printed_even_when_quiet() {
+    let place = Place::new();
+    let doubtful = RINGS.replace("0.43", "0.2") + "[kernel]\nh-over-dx = 1.5\n[numerics]\nviscosity = 0\n";
+    let file = place.scene("scene.toml", &doubtful);
+    for ranks in [0, 3] {
+        let output = prep(ranks, &[text(&file), "-o", text(&place.path(&format!("run-{ranks}"))), "--quiet"]);
+        let printed = stderr(&output);
+        assert!(output.status.success(), "{printed}");
+        for what in ["h-over-dx = 1.5", "k0 = 0.2", "viscosity = 0"] {
+            assert_eq!(printed.matches(what).count(), 1, "{what} in {printed}");
+        }
+        assert_eq!(printed.lines().count(), 3);
+    }
+}
+
+#[test]
+fn a_closed_pipe_does_no_harm() {
+    let place = Place::new();
+    let file = place.scene("scene.toml", RINGS);
+    let bad = place.scene("bad.toml", &RINGS.replace("4 mm", "4 mmm"));
+    for (scene, code) in [(&file, 0), (&bad, 2)] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let run = place.path(&format!("run-{code}"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sph-prep"));
+        command.args([text(scene), "-o", text(&run)]).stdin(Stdio::null());
+        let status = command.stdout(writer.try_clone().unwrap()).stderr(writer).status().unwrap();
+        assert_eq!(status.code(), Some(code));
+        assert_eq!(RunFolder::new(&run).initial().exists(), code == 0);
+    }
+}
+
+#[test]
 fn a_folder_in_use_is_left_as_it_is() {
     let place = Place::new();
     let file = place.scene("scene.toml", RINGS);

@@ -3,12 +3,13 @@
 use crate::error::RunError;
 use crate::parallel::gather;
 use crate::physics::Physics;
-use crate::report::COLUMNS;
+use crate::report;
 use crate::simulation::Simulation;
 use formats::folder::RunFolder;
 use formats::scene::Scene;
 use formats::schema::Kept;
 use formats::snapshot::{self, Header, Rows};
+use formats::space::Space;
 use std::fs::{self, File, OpenOptions};
 use std::io::{Seek, Write};
 use std::path::Path;
@@ -83,8 +84,8 @@ impl Growing {
 }
 
 /// First line of the history.
-pub fn history_head() -> String {
-    COLUMNS.join(",") + "\n"
+pub fn history_head(space: Space) -> String {
+    report::columns(space).join(",") + "\n"
 }
 
 /// First line of the log of rates.

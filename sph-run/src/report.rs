@@ -6,25 +6,33 @@ use crate::parallel::comm::Reduce;
 use crate::physics::Physics;
 use crate::simulation::Simulation;
 use crate::space::Space;
-use formats::scene::{Scene, Shape};
+use formats::scene::Scene;
 
-/// Names and units of the columns, as in the first line of the file.
-pub const COLUMNS: [&str; 14] = [
-    "time [s]",
-    "step [1]",
-    "time_step [s]",
-    "kinetic_energy [J]",
-    "potential_energy [J]",
-    "elastic_energy [J]",
-    "max_speed [m/s]",
-    "front [m]",
-    "front_mass_99_5 [m]",
-    "height [m]",
-    "volume_ratio [1]",
-    "min_density [kg/m3]",
-    "max_density [kg/m3]",
-    "below_floor [1]",
-];
+/// Names and units of the columns, as in the first line of the file. Energies are per metre of depth in plane strain.
+pub fn columns(space: formats::space::Space) -> [&'static str; 14] {
+    let [kinetic, potential, elastic] = match space {
+        formats::space::Space::PlaneStrain => {
+            ["kinetic_energy [J/m]", "potential_energy [J/m]", "elastic_energy [J/m]"]
+        }
+        _ => ["kinetic_energy [J]", "potential_energy [J]", "elastic_energy [J]"],
+    };
+    [
+        "time [s]",
+        "step [1]",
+        "time_step [s]",
+        kinetic,
+        potential,
+        elastic,
+        "max_speed [m/s]",
+        "front [m]",
+        "front_mass_99_5 [m]",
+        "height [m]",
+        "volume_ratio [1]",
+        "min_density [kg/m3]",
+        "max_density [kg/m3]",
+        "below_floor [1]",
+    ]
+}
 
 /// One line of the history.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,11 +41,11 @@ pub struct Line {
     pub potential: f64,
     pub elastic: f64,
     pub max_speed: f64,
-    /// Farthest particle from the axis, or along x, plus half a spacing, m.
+    /// Farthest particle from the axis ([`Scene::is_radial`]), or from x = 0 along +x, plus half a spacing, m.
     pub front: f64,
     /// Distance within which 99.5 % of the mass lies, m.
     pub front_mass: f64,
-    /// Top of the highest particle above the floor, m.
+    /// Top of the highest particle above the floor ([`Scene::floor`]), m.
     pub height: f64,
     /// Volume over that of the same mass at the initial density.
     pub volume_ratio: f64,
@@ -59,15 +67,9 @@ pub struct Scales {
 const MASS_SHARE: f64 = 0.995;
 
 impl Scales {
-    /// From the scene: fronts are radii in the axisymmetric space and around a cylinder in 3-D.
+    /// From the scene.
     pub fn new(scene: &Scene) -> Self {
-        let cylinder = scene.bodies.iter().any(|b| matches!(b.shape, Shape::Cylinder { .. }));
-        let floors = scene.walls.iter().filter(|w| w.axis == 2 && w.side > 0.0).map(|w| w.at);
-        Self {
-            radial: cylinder && scene.space == formats::space::Space::ThreeD,
-            floor: floors.reduce(f64::min).unwrap_or(0.0),
-            density: scene.material.density(),
-        }
+        Self { radial: scene.is_radial(), floor: scene.floor(), density: scene.material.density() }
     }
 }
 

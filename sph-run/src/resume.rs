@@ -5,6 +5,7 @@ use crate::error::RunError;
 use crate::output::{self, Growing};
 use crate::simulation::Clock;
 use formats::folder::RunFolder;
+use formats::space::Space;
 use formats::{checkpoint, snapshot};
 use std::path::PathBuf;
 
@@ -101,12 +102,12 @@ pub struct Files {
 
 impl Files {
     /// Opens them, cut back to what belongs to the start.
-    pub fn open(folder: &RunFolder, start: &Start) -> Result<Self, RunError> {
+    pub fn open(folder: &RunFolder, start: &Start, space: Space) -> Result<Self, RunError> {
         for path in [folder.out(), folder.log()] {
             std::fs::create_dir_all(&path)
                 .map_err(|e| RunError::CannotWrite { path: path.clone(), message: e.to_string() })?;
         }
-        let history = Growing::open(&folder.history(), start.history_length, &output::history_head())?;
+        let history = Growing::open(&folder.history(), start.history_length, &output::history_head(space))?;
         let log = folder.log().join("performance.csv");
         let logged = if start.fresh() { 0 } else { std::fs::metadata(&log).map_or(0, |m| m.len()) };
         let performance = Growing::open(&log, logged, output::PERFORMANCE_HEAD)?;

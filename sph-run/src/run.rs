@@ -64,7 +64,7 @@ impl Job for Run<'_> {
         if self.start.fresh() {
             simulation.accelerate();
         }
-        let files = agree(self.comm, || Files::open(self.folder, &self.start))?;
+        let files = agree(self.comm, || Files::open(self.folder, &self.start, self.scene.space))?;
         let progress = Progress::new(self.cli.quiet || rank != 0, &simulation.clock, self.scene.end.time, count);
         Course { scales: Scales::new(self.scene), job: self, simulation, files, progress, checkpointed: Instant::now() }
             .follow()

@@ -134,18 +134,41 @@ fn refused(work: &WorkFolder, program: &str, arguments: &[OsString], ranks: usiz
     output.stderr.split("--------------------").next().unwrap_or_default().to_owned()
 }
 
-/// As [`refused`], on every number of ranks; the message must name `place` and say `word`, in one message only.
+/// The messages of a failure: lines that start with the program's name and "error:", as clap's do with "error:" alone,
+/// or with a place in a scene.
+fn messages<'a>(program: &str, said: &'a str) -> Vec<&'a str> {
+    let own = format!("{program}: error: ");
+    let is_place = |line: &str| {
+        let mut parts = line.split(": ").next().unwrap_or_default().rsplit(':');
+        let number = |part: Option<&str>| part.is_some_and(|part| part.parse::<usize>().is_ok());
+        number(parts.next()) && number(parts.next())
+    };
+    said.lines().filter(|l| l.starts_with(&own) || l.starts_with("error: ") || is_place(l)).collect()
+}
+
+/// As [`refused`], on every number of ranks. There must be one message, or one a fault of a scene, said by one rank
+/// only; one of them must name `place` and say `word`, or say it in the lines that follow it.
 #[track_caller]
 fn refused_at(work: &WorkFolder, program: &str, arguments: &[&str], code: i32, place: &str, word: &str) {
     let arguments: Vec<OsString> = arguments.iter().map(OsString::from).collect();
     for ranks in RANKS {
         let said = refused(work, program, &arguments, ranks, code);
-        assert!(
-            said.contains(place) && said.contains(word),
-            "{program} {arguments:?}: no {place} or {word} in: {said}"
-        );
-        let lines: Vec<_> = said.lines().filter(|line| line.contains(place) && line.contains(word)).collect();
-        assert!(lines.len() <= 1, "said {} times: {said}", lines.len());
+        told_once(program, &said, place, word);
+    }
+}
+
+#[track_caller]
+fn told_once(program: &str, said: &str, place: &str, word: &str) {
+    assert!(said.contains(place) && said.contains(word), "{program}: no {place} or {word} in: {said}");
+    let found = messages(program, said);
+    let own = found.iter().filter(|line| line.contains("error: ")).count();
+    // A program may put its name before the first fault of a scene.
+    let faults = found.iter().filter(|line| line.contains(".toml:")).count();
+    assert!(own == 1 || (own == 0 && faults > 0), "{} messages: {said}", found.len());
+    assert!(own == 0 || found.len() == own.max(faults), "more than one message: {said}");
+    for line in found {
+        let tail = line.rsplit("error: ").next().unwrap_or(line);
+        assert_eq!(said.matches(tail).count(), 1, "said more than once: {said}");
     }
 }
 
@@ -294,18 +317,55 @@ fn run_folders_that_cannot_be_run() {
     }
 }
 
+#[test]
+fn scenes_too_large_for_the_memory() {
+    let huge = [
+        (SOUND.replace("10 mm", "1 um"), "about 10000000000 particles"),
+        // Too many even to be counted.
+        (
+            SOUND.replace("10 mm", "0.02 mm").replace("plane-strain", "3d").replace("[0, 0, 0]", "[0, -0.1, 0]"),
+            "about 125000000000 particles",
+        ),
+    ];
+    for (scene, count) in huge {
+        let work = WorkFolder::new();
+        work.write("scene.toml", &scene);
+        let arguments = ["scene.toml", "-o", "runs/huge"];
+        refused_at(&work, "sph-prep", &arguments, exit::USAGE, count, "m would fit");
+        let said = refused(&work, "sph-prep", &arguments.map(OsString::from), 0, exit::USAGE);
+        let cost = said.find("memory  ").expect("the cost is told");
+        assert!(cost < said.find("error: ").unwrap(), "before it is refused: {said}");
+    }
+}
+
+#[test]
+fn results_that_cannot_be_written() {
+    // Not even root writes into a file as if it were a folder.
+    let in_the_way = |folder: PathBuf| move |_: &RunFolder| fs::write(&folder, "mine").unwrap();
+    damaged_in("sph-run", "out", |f| in_the_way(f.out())(f), exit::CANNOT_WRITE, "out");
+    damaged_in("sph-post", "post", |f| in_the_way(f.post())(f), exit::CANNOT_WRITE, "post");
+}
+
 /// The lock is taken before the particles are looked at, so its file may stay: it is left out of the comparison.
+#[track_caller]
 fn damaged(name: &str, damage: impl Fn(&RunFolder), code: i32, word: &str) {
+    damaged_in("sph-run", name, damage, code, word);
+}
+
+/// As [`damaged`], for any program.
+#[track_caller]
+fn damaged_in(program: &str, name: &str, damage: impl Fn(&RunFolder), code: i32, word: &str) {
     let work = WorkFolder::new();
     let folder = prepared(&work, "run", SOUND, 1);
     damage(&folder);
     for ranks in RANKS {
         let before = contents(folder.path());
-        let output = run_within(PATIENCE, command("sph-run", &["run"], ranks).current_dir(work.path()));
-        let said = format!("{name} on {ranks} ranks: {output}");
+        let output = run_within(PATIENCE, command(program, &["run"], ranks).current_dir(work.path()));
+        let said = format!("{program}, {name} on {ranks} ranks: {output}");
         assert!(!output.timed_out, "hangs: {said}");
         assert_eq!(output.code, code, "{said}");
-        assert!(output.stderr.contains(word) && !output.stderr.contains("panicked"), "{said}");
+        assert!(!output.stderr.contains("panicked"), "{said}");
+        told_once(program, output.stderr.split("--------------------").next().unwrap_or_default(), "", word);
         let after = contents(folder.path());
         for (path, bytes) in &before {
             assert!(after.get(path) == Some(bytes) || *path == folder.lock(), "{} has changed: {said}", path.display());
@@ -333,8 +393,12 @@ fn scenes_changed_after_preparation() {
         move |f: &RunFolder| fs::write(f.scene(), SOUND.replace(from, to)).unwrap()
     };
     damaged("another scene", edit("30 deg", "31 deg"), exit::NO_INPUT, "scene");
-    damaged("a bad scene", edit("30 deg", "31 degrees"), exit::USAGE, "scene.lock.toml:8:");
-    damaged("no scene", |f| fs::remove_file(f.scene()).unwrap(), exit::NO_INPUT, "scene.lock.toml");
+    for program in ["sph-run", "sph-post"] {
+        let bad = edit("30 deg", "31 degrees");
+        damaged_in(program, "a bad scene", bad, exit::USAGE, "scene.lock.toml:8:");
+        damaged_in(program, "no TOML", edit("poisson = 0.3", "poisson = 0,3"), exit::USAGE, "scene.lock.toml:");
+        damaged_in(program, "no scene", |f| fs::remove_file(f.scene()).unwrap(), exit::NO_INPUT, "scene.lock.toml");
+    }
 }
 
 #[test]
@@ -349,7 +413,7 @@ fn runs_that_another_process_holds_or_has_begun() {
     let arguments = ["run", "--new"].map(OsString::from);
     for ranks in RANKS {
         let said = refused(&work, "sph-run", &arguments, ranks, exit::USAGE);
-        assert!(said.contains("run") && said.contains("begun"), "{said}");
+        told_once("sph-run", &said, "run", "begun");
     }
 }
 
@@ -358,10 +422,10 @@ fn runs_that_cannot_be_evaluated() {
     let work = WorkFolder::new();
     let folder = prepared(&work, "run", SOUND, 1);
     work.write("file", "mine");
-    let refuse = |name: &str, word: &str| {
-        let said = refused(&work, "sph-post", &[OsString::from(name)], 0, exit::NO_INPUT);
-        assert!(said.contains(word), "{said}");
-    };
+    for arguments in [&[][..], &["run", "--fast"], &["run", "--basal-height", "3 kg"]] {
+        refused_at(&work, "sph-post", arguments, exit::USAGE, "error: ", "");
+    }
+    let refuse = |name: &str, word: &str| refused_at(&work, "sph-post", &[name], exit::NO_INPUT, name, word);
     refuse("missing", "missing");
     refuse("file", "file");
     // A run that has not begun is evaluated at its start: that is no fault.

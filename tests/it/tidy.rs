@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use tests::repository;
+use tests::{WorkFolder, repository};
 
 const PACKAGES: [&str; 6] = ["formats", "sph-prep", "sph-run", "sph-post", "workflows", "tests"];
 const MOST_LINES: usize = 600;
@@ -82,7 +82,7 @@ fn formatted() {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let has = Command::new(&cargo).args(["fmt", "--version"]).output().is_ok_and(|output| output.status.success());
     if !has {
-        eprintln!("LEFT OUT: rustfmt is not installed");
+        tests::left_out("rustfmt is not installed");
         return;
     }
     let output = Command::new(cargo).args(["fmt", "--all", "--check"]).current_dir(repository()).output().unwrap();
@@ -114,7 +114,9 @@ fn exit_codes_of_the_readme() -> BTreeSet<i32> {
 fn the_readme_names_the_exit_codes() {
     let codes = exit_codes();
     assert!(codes.len() >= 7 && codes[&65] == "NO_INPUT", "{codes:?}");
-    assert_eq!(codes.into_keys().collect::<BTreeSet<_>>(), exit_codes_of_the_readme());
+    // 1 is no code of the stages: `./talus test` has it for tests that fail.
+    let with_tests: BTreeSet<_> = codes.into_keys().chain([1]).collect();
+    assert_eq!(with_tests, exit_codes_of_the_readme());
 }
 
 #[test]
@@ -149,5 +151,39 @@ fn every_package_is_a_member_with_the_common_settings() {
         for line in ["version.workspace = true", "license.workspace = true", "[lints]\nworkspace = true"] {
             assert!(text.contains(line), "{package}/Cargo.toml: no `{line}`");
         }
+    }
+}
+
+/// Runs ./talus with a cargo that answers `--version` with a line and else says how it was called.
+fn launched_with_cargo(version: &str) -> tests::Output {
+    use std::os::unix::fs::PermissionsExt;
+    let work = WorkFolder::new();
+    let script = format!("#!/bin/sh\n[ \"$1\" = --version ] && echo \"{version}\" && exit 0\necho \"called: $*\"\n");
+    let cargo = work.write("cargo", &script);
+    std::fs::set_permissions(cargo, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let mut path = work.path().as_os_str().to_owned();
+    path.push(":");
+    path.push(std::env::var_os("PATH").unwrap_or_default());
+    let mut command = Command::new(repository().join("talus"));
+    // Without a cargo in the home folder either.
+    command.arg("cases").env("PATH", path).env("HOME", work.path()).env("TALUS_NO_INSTALL", "1");
+    tests::run_within(tests::TIME_LIMIT, &mut command)
+}
+
+#[test]
+fn the_launcher_refuses_a_cargo_that_is_too_old() {
+    let manifest: toml::Table = std::fs::read_to_string(repository().join("Cargo.toml")).unwrap().parse().unwrap();
+    let wanted = manifest["workspace"]["package"]["rust-version"].as_str().unwrap().to_owned();
+    let (major, minor) = wanted.split_once('.').unwrap();
+    let minor: u32 = minor.parse().unwrap();
+    for old in [format!("{major}.{}.9", minor - 1), format!("{major}.9.0"), "0.99.0".to_owned()] {
+        let output = launched_with_cargo(&format!("cargo {old} (abc 2020-01-01)")).expect(formats::exit::CANNOT_WRITE);
+        let said = &output.stderr;
+        assert!(said.contains(&format!("cargo {old} is too old")) && said.contains("rustup"), "{said}");
+        assert!(said.contains(&format!("Rust {wanted} or newer")) && output.stdout.is_empty(), "{output}");
+    }
+    for new in [format!("{wanted}.0"), format!("{major}.{}.0-nightly", minor + 10), "2.0.0".to_owned()] {
+        let output = launched_with_cargo(&format!("cargo {new} (abc 2030-01-01)")).expect(formats::exit::DONE);
+        assert!(output.stdout.contains("called: run"), "{output}");
     }
 }

@@ -44,17 +44,10 @@ fn last_snapshot(folder: &formats::folder::RunFolder) -> PathBuf {
     folder.out().join(name)
 }
 
-fn dump(tool: &str, header_only: &str, file: &Path) -> Option<String> {
-    match Command::new(tool).arg(header_only).arg(file).output() {
-        Err(_) => {
-            eprintln!("LEFT OUT: {tool} is not installed");
-            None
-        }
-        Ok(output) => {
-            assert!(output.status.success(), "{tool}: {}", String::from_utf8_lossy(&output.stderr));
-            Some(String::from_utf8_lossy(&output.stdout).into_owned())
-        }
-    }
+/// What a tool says about the header of a file; the tool must be there.
+fn dump(tool: &str, package: &str, header_only: &str, file: &Path) -> String {
+    tests::expect_program(tool, package);
+    tests::run_within(tests::TIME_LIMIT, Command::new(tool).arg(header_only).arg(file)).expect(exit::DONE).stdout
 }
 
 #[test]
@@ -86,10 +79,8 @@ fn results_open_in_xarray_and_pass_the_cf_checker() {
 fn the_command_line_tools_of_hdf5_and_netcdf_read_them() {
     let work = WorkFolder::new();
     let folder = whole_run(&work, "run", &scene("axisymmetric"), 1);
-    if let Some(text) = dump("h5dump", "-H", &last_snapshot(&folder)) {
-        assert!(text.contains("VTKHDF") && text.contains("particles"), "{text}");
-    }
-    if let Some(text) = dump("ncdump", "-h", &folder.post().join("results.nc")) {
-        assert!(text.contains("t:units = \"s\"") && text.contains(":Conventions = \"CF-1.11\""), "{text}");
-    }
+    let text = dump("h5dump", "hdf5-tools", "-H", &last_snapshot(&folder));
+    assert!(text.contains("VTKHDF") && text.contains("particles"), "{text}");
+    let text = dump("ncdump", "netcdf-bin", "-h", &folder.post().join("results.nc"));
+    assert!(text.contains("t:units = \"s\"") && text.contains(":Conventions = \"CF-1.11\""), "{text}");
 }

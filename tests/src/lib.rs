@@ -5,7 +5,7 @@ pub mod python;
 
 use formats::{folder::RunFolder, snapshot};
 use std::ffi::OsStr;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -52,6 +52,22 @@ fn build() -> PathBuf {
         .expect("cargo starts");
     assert!(output.status.success(), "the programs do not build:\n{}", String::from_utf8_lossy(&output.stderr));
     folder
+}
+
+/// Says that a test, or a part of it, is left out, and why. Straight to standard error: `cargo test` shows it at once,
+/// because it captures the print macros only; nextest shows it at the end, as .config/nextest.toml has it.
+pub fn left_out(reason: &str) {
+    let name = std::thread::current().name().unwrap_or("a test").to_owned();
+    // Nobody to tell where standard error is closed.
+    let _ = writeln!(std::io::stderr(), "LEFT OUT: {name}: {reason}");
+}
+
+/// Fails the test where a program it needs is not on the path. `package`: what it is in.
+#[track_caller]
+pub fn expect_program(name: &str, package: &str) {
+    let found = std::env::var_os("PATH")
+        .is_some_and(|path| std::env::split_paths(&path).any(|folder| folder.join(name).is_file()));
+    assert!(found, "{name} is not on the path; this test needs {package}, which `./talus test` installs where it may");
 }
 
 /// A folder that is removed with all it holds, kept where the test fails and TALUS_KEEP is set.

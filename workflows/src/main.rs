@@ -46,11 +46,11 @@ enum Command {
         /// MPI ranks; the machine's cores where it is left out.
         #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
         ranks: Option<u32>,
-        /// Use finished runs of the same scene in runs/validation again.
+        /// Use runs of the same scene in runs/validation again; their figures keep the commit that computed them.
         #[arg(long)]
         reuse: bool,
     },
-    /// Run every test of the repository.
+    /// Run every test of the repository; ends with exit code 1 where one fails.
     Test {
         /// Handed on to the test runner.
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]

@@ -72,15 +72,25 @@ pub fn cargo() -> PathBuf {
 /// Runs the stages that are still to do: all of them in a new folder, the computation from its last checkpoint where
 /// it was stopped, and only `sph-post` where it is done.
 pub fn run(programs: &Programs, job: &Job) -> Result<(), Failure> {
+    prepare(programs, job)?;
+    compute(programs, job)
+}
+
+/// The first stage: leaves a folder prepared from the job's scene, which may be one that was there before.
+pub fn prepare(programs: &Programs, job: &Job) -> Result<(), Failure> {
     let folder = RunFolder::new(job.folder);
     if job.fresh {
         remove(&folder)?;
     }
-    if is_occupied(job.folder) {
-        same_scene(&folder, job)?;
-    } else {
-        prepare(programs, job)?;
+    match is_occupied(job.folder) {
+        true => same_scene(&folder, job),
+        false => sph_prep(programs, job),
     }
+}
+
+/// The stages after [`prepare`].
+pub fn compute(programs: &Programs, job: &Job) -> Result<(), Failure> {
+    let folder = RunFolder::new(job.folder);
     let name = paths::short(job.folder).display().to_string();
     if folder.done().is_file() {
         eprintln!("talus: {name} is done: only the results are made again (--fresh starts over)");
@@ -109,7 +119,7 @@ pub fn results(folder: &Path) -> Vec<PathBuf> {
     [folder.series(), folder.history()].into_iter().filter(|path| path.is_file()).chain(made).collect()
 }
 
-fn prepare(programs: &Programs, job: &Job) -> Result<(), Failure> {
+fn sph_prep(programs: &Programs, job: &Job) -> Result<(), Failure> {
     if let Some(parent) = job.folder.parent() {
         std::fs::create_dir_all(parent)
             .map_err(|e| Failure::cannot_write(format!("{}: cannot make the folder: {e}", parent.display())))?;

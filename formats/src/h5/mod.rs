@@ -1,4 +1,4 @@
-//! HDF5 and MPI: the only place in this crate that knows of ranks.
+//! HDF5 and MPI: what collective work on files has in common. `snapshot` and `checkpoint` build on it.
 //!
 //! A collective call that fails on one rank only would leave the others waiting for ever. [`agree`] ends every
 //! collective step: all ranks learn whether all succeeded, and all return the same error.

@@ -435,7 +435,7 @@ fn section(shape: &Shape, space: Space, z: f64) -> Section {
 }
 
 /// Lower and upper corner of the box around a shape, m.
-fn bounds(shape: &Shape, space: Space) -> ([f64; 3], [f64; 3]) {
+pub(super) fn bounds(shape: &Shape, space: Space) -> ([f64; 3], [f64; 3]) {
     match *shape {
         Shape::Cylinder { base: [x, y, z], radius, height } => match space {
             Space::Axisymmetric => ([0.0, 0.0, z], [radius, 0.0, z + height]),

@@ -4,6 +4,7 @@
 
 mod check;
 mod error;
+mod front;
 mod geometry;
 mod raw;
 mod walls;

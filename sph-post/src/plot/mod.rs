@@ -78,15 +78,3 @@ fn title(analysis: &Analysis, what: &str) -> String {
     let dots = if title.chars().count() > 60 { "\u{2026}" } else { "" };
     if title.is_empty() { what.into() } else { format!("{short}{dots}: {what}") }
 }
-
-/// Final run-out (r - r0)/r0 and, where it is known, height h/r0 of a cylinder of grains of aspect ratio
-/// `a` = H0/r0 on a plane (Lube, Huppert, Sparks & Hallworth 2004, J. Fluid Mech. 508, 175-199).
-fn lube(a: f64) -> (f64, Option<f64>) {
-    let run_out = if a < 1.7 { 1.24 * a } else { 1.6 * a.sqrt() };
-    let height = match a {
-        a if a < 1.7 => Some(a.min(0.858)),
-        a if a < 10.0 => Some(0.88 * a.powf(1.0 / 6.0)),
-        _ => None,
-    };
-    (run_out, height)
-}

@@ -1,13 +1,14 @@
 //! Surfaces of the deposit over time.
 
 use super::canvas::{self, Entry, Frame, MARGIN, SMALL, viridis};
-use super::{Lengths, Times, lube, title};
+use super::{Lengths, Times, title};
 use crate::{
     analysis::{Analysis, spread},
     deposit::Profile,
     failure::Failure,
     geometry::Geometry,
 };
+use formats::laws;
 use plotters::style::{
     RGBColor,
     text_anchor::{HPos, VPos},
@@ -27,7 +28,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let shown = spread(a.moments.len(), CURVES);
     let curves: Vec<(f64, Vec<(f64, f64)>)> =
         shown.iter().map(|&k| (a.moments[k].time, outline(g, &a.moments[k].deposit.profile, lengths.unit))).collect();
-    let reference = g.cylinder_aspect.map(lube);
+    let reference = g.cylinder_aspect.map(|a| (laws::lube_runout(a), laws::lube_height(a)));
     let (mut x, mut top) = ([0.0_f64, 0.0_f64], 0.0_f64);
     for &(s, h) in curves.iter().flat_map(|c| &c.1) {
         x = [x[0].min(s), x[1].max(s)];

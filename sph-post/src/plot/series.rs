@@ -1,8 +1,9 @@
 //! Run-out and energies over time.
 
 use super::canvas::{self, CURVES, Entry, Frame, MARGIN, SMALL};
-use super::{Times, lube, title};
+use super::{Times, title};
 use crate::{analysis::Analysis, failure::Failure};
+use formats::{laws, space::Space};
 use plotters::style::{
     RGBColor,
     text_anchor::{HPos, VPos},
@@ -20,7 +21,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let times = Times::of(a);
     let (fronts, fronts_name) = fronts(a, times.unit);
     let (energies, energies_name) = energies(a, times.unit);
-    let reference = a.geometry.cylinder_aspect.map(|aspect| lube(aspect).0);
+    let reference = a.geometry.cylinder_aspect.map(laws::lube_runout);
     let last = (a.last().time / times.unit).max(1e-9);
     let left = MARGIN[0] + 8.0;
     let tops = [56.0, 56.0 + INNER[1] + MARGIN[1] + 22.0];
@@ -56,14 +57,14 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     })
 }
 
-/// The three run-outs, relative to the start where there is one body.
+/// The three run-outs, relative to the start where that has a meaning.
 fn fronts(a: &Analysis, unit: f64) -> (Vec<Curve>, String) {
-    let single = a.geometry.extent.is_some();
-    let value = |front: f64| if single { a.scaled(front) } else { front };
+    let scaled = a.geometry.runs_outward;
+    let value = |front: f64| if scaled { a.scaled(front) } else { front };
     let curve = |pick: &dyn Fn(&crate::deposit::Fronts) -> f64| {
         a.moments.iter().map(|m| (m.time / unit, value(pick(&m.deposit.fronts)))).collect()
     };
-    let name = match (single, a.geometry.radial) {
+    let name = match (scaled, a.geometry.radial) {
         (true, true) => "(r \u{2212} r\u{2080}) / r\u{2080}",
         (true, false) => "(x \u{2212} L\u{2080}) / L\u{2080}",
         (false, true) => "r (m)",
@@ -77,18 +78,20 @@ fn fronts(a: &Analysis, unit: f64) -> (Vec<Curve>, String) {
     (curves, name.into())
 }
 
-/// Energies over that of the start; from the history where there is one, since it is finer.
+/// Energies over that of the start, the potential one measured from the floor; from the history where there is one, since it is finer.
 fn energies(a: &Analysis, unit: f64) -> (Vec<Curve>, String) {
     let from_history = a.history.as_ref().and_then(|h| {
         let column = |name| h.column(name);
         let parts = [column("kinetic_energy")?, column("potential_energy")?, column("elastic_energy")?];
         Some((0..h.times().len()).map(|k| (h.times()[k], parts.map(|p| p[k]))).collect::<Vec<_>>())
     });
-    let rows = from_history.unwrap_or_else(|| {
+    let mut rows = from_history.unwrap_or_else(|| {
         a.moments.iter().map(|m| (m.time, [m.energy.kinetic, m.energy.potential, m.energy.elastic])).collect()
     });
+    rows.iter_mut().for_each(|r| r.1[1] = a.moments[0].energy.above_floor(&a.geometry, r.1[1]));
     let start: f64 = rows.first().map_or(0.0, |r| r.1.iter().sum());
-    let (scale, name) = if start > 0.0 { (start, "energy / energy at the start") } else { (1.0, "energy (J)") };
+    let joule = if a.geometry.space == Space::PlaneStrain { "energy (J/m)" } else { "energy (J)" };
+    let (scale, name) = if start > 0.0 { (start, "energy / energy at the start") } else { (1.0, joule) };
     let curve = |pick: &dyn Fn([f64; 3]) -> f64| rows.iter().map(|r| (r.0 / unit, pick(r.1) / scale)).collect();
     let curves = vec![
         ("kinetic", curve(&|e| e[0])),

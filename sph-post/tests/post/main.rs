@@ -14,7 +14,22 @@ struct Called {
 }
 
 fn post(run: &Path, more: &[&str]) -> Called {
-    let output = Command::new(env!("CARGO_BIN_EXE_sph-post")).arg(run).args(more).output().unwrap();
+    called(command(env!("CARGO_BIN_EXE_sph-post")).arg(run).args(more))
+}
+
+/// This process runs MPI: a program that inherits its environment would take itself for the same rank.
+fn command(program: &str) -> Command {
+    let mut command = Command::new(program);
+    for (name, _) in std::env::vars_os() {
+        if name.to_str().is_some_and(|n| ["OMPI_", "PMIX_", "ORTE_", "PMI_"].iter().any(|p| n.starts_with(p))) {
+            command.env_remove(name);
+        }
+    }
+    command
+}
+
+fn called(command: &mut Command) -> Called {
+    let output = command.output().unwrap();
     Called {
         code: output.status.code(),
         out: String::from_utf8(output.stdout).unwrap(),
@@ -93,6 +108,13 @@ fn everything_is_written_and_told() {
         assert!(times.windows(2).all(|w| w[0] < w[1]));
         let history = results::read(&made.run.post().join("history.nc"), "kinetic_energy").unwrap();
         assert_eq!(history.len(), 101);
+        // It is still on its way: the front moves during the last T; the energy of the made-up history is back at zero.
+        let summary = std::fs::read(made.run.post().join("summary.json")).unwrap();
+        let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
+        assert_eq!(summary["kinetic_over_peak"].as_f64(), Some(0.0));
+        let last = summary["front_mass_last_T"].as_f64().unwrap();
+        assert!(last > 0.05 && last < summary["runout_mass_99_5"].as_f64().unwrap(), "{last}");
+        assert!((summary["volume_ratio"].as_f64().unwrap() - 1.0).abs() < 1e-12);
         // Twice the same: same bits.
         let before = std::fs::read(made.run.post().join("profiles.svg")).unwrap();
         assert_eq!(post(made.run.path(), &["--basal-height", "8 mm", "--quiet"]).err, "");
@@ -141,7 +163,7 @@ fn wrong_folders_and_files_are_refused_with_one_message() {
     std::fs::write(made.run.scene(), SCENES[0].text.replace("30 deg", "31 deg")).unwrap();
     refused(made.run.path(), exit::NO_INPUT, "another scene");
     std::fs::write(made.run.scene(), "space = 3").unwrap();
-    refused(made.run.path(), exit::NO_INPUT, "scene.lock.toml");
+    refused(made.run.path(), exit::USAGE, "scene.lock.toml");
     std::fs::write(made.run.scene(), SCENES[0].text).unwrap();
 
     // post/ can't be written where a file has its name.
@@ -149,4 +171,82 @@ fn wrong_folders_and_files_are_refused_with_one_message() {
     std::fs::write(made.run.post(), "").unwrap();
     refused(made.run.path(), exit::CANNOT_WRITE, "post");
     assert_eq!(post(made.run.path(), &["--basal-height", "3 kg"]).code, Some(exit::USAGE));
+}
+
+#[test]
+fn of_several_ranks_one_works_and_speaks() {
+    let made = Made::new(SCENES[1].text);
+    made.initial(&block(&made.scene));
+    let alone = post(made.run.path(), &[]);
+    assert_eq!(alone.code, Some(exit::DONE), "{}", alone.err);
+    let read = || std::fs::read(made.run.post().join("summary.json")).unwrap();
+    let files = || std::fs::read_dir(made.run.post()).unwrap().count();
+    let before = (read(), files());
+    let mpirun = |run: &Path| {
+        let mut command = command("mpirun");
+        command.args(["-n", "3", env!("CARGO_BIN_EXE_sph-post")]).arg(run);
+        for name in ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMPI_MCA_rmaps_base_oversubscribe"] {
+            command.env(name, "1");
+        }
+        called(command.env("OMPI_MCA_hwloc_base_binding_policy", "none"))
+    };
+    let three = mpirun(made.run.path());
+    assert_eq!((three.code, &three.out), (Some(exit::DONE), &alone.out), "{}", three.err);
+    assert_eq!(three.err.matches("snapshots, particles").count(), 1, "{}", three.err);
+    assert_eq!((read(), files()), before);
+    std::fs::write(made.run.scene(), "space = 3").unwrap();
+    let refused = mpirun(made.run.path());
+    assert_eq!((refused.code, refused.out.as_str()), (Some(exit::USAGE), ""), "{}", refused.err);
+    assert_eq!(refused.err.matches("sph-post: error: ").count(), 1, "{}", refused.err);
+}
+
+#[test]
+fn a_closed_pipe_is_no_failure() {
+    let made = Made::new(SCENES[1].text);
+    made.initial(&block(&made.scene));
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let mut command = command(env!("CARGO_BIN_EXE_sph-post"));
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    assert_eq!(called(command.arg(made.run.path()).stdout(writer).stderr(full())).code, Some(exit::DONE));
+    assert!(made.run.post().join("results.nc").is_file());
+}
+
+#[test]
+fn run_outs_are_given_only_where_fronts_say_how_far_the_body_ran() {
+    let plane = SCENES[1].text;
+    let held = "[wall.left]\naxis = \"x\"\nat = \"0 m\"\nside = \"above\"\nslip = \"no-slip\"\n[end]";
+    let free = plane.replace("symmetry = [\"x\"]", "");
+    let body = |shape: &str| {
+        let begin = plane.find("box =").unwrap();
+        let end = begin + plane[begin..].find('\n').unwrap();
+        let wall = plane.replace("symmetry = [\"x\"]", "").replace("[end]", held);
+        wall.replace(&plane[begin..end], shape)
+    };
+    let wedge = |x: &str, falls: &str| {
+        body(&format!("wedge = {{ corner = [{x}, 0, 0], size = [\"0.1 m\", 0, \"0.1 m\"], falls = \"{falls}\" }}"))
+    };
+    for (text, given) in [
+        (plane.to_string(), true),
+        (free.clone(), false),
+        (free.replace("[end]", held), true),
+        (body("box = { min = [0.2, 0, 0], max = [0.3, 0, 0.1] }"), false),
+        (wedge("0", "right"), true),
+        (wedge("0.1", "left"), false),
+    ] {
+        let made = Made::new(text.leak());
+        made.initial(&block(&made.scene));
+        let called = post(made.run.path(), &["--quiet"]);
+        assert_eq!(called.code, Some(exit::DONE), "{}", called.err);
+        let summary: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(made.run.post().join("summary.json")).unwrap()).unwrap();
+        for name in ["furthest", "mass", "thickness"] {
+            assert!(read(&made.run, &format!("front_{name}"))[0] > 0.0);
+            assert_eq!(read(&made.run, &format!("runout_{name}"))[0].is_nan(), !given, "{name}");
+        }
+        for name in ["runout_furthest", "runout_mass_99_5", "runout_thickness"] {
+            assert_eq!(summary[name].is_null(), !given, "{summary:#}");
+        }
+        assert!(summary["r0_m"].is_number() && summary["front_mass_last_T"].is_null());
+    }
 }

@@ -1,18 +1,19 @@
 //! Numbers of a finished run: from `post/summary.json` and `post/profile_final.csv`, which `sph-post` writes.
 
-use super::checks::Validation;
+use super::{checks::Validation, record::Record};
 use crate::failure::Failure;
 use formats::folder::RunFolder;
 use serde::Deserialize;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// What is measured.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum Measure {
-    /// (r - r0)/r0, with r the radius that holds 99.5 % of the mass.
+    /// (r - r0)/r0, with r the radius that holds 99.5 % of the mass. It follows single grains that left the deposit.
     Runout,
-    /// (r - r0)/r0, with r where the deposit thins out.
+    /// (r - r0)/r0, with r up to which the deposit is at least dx/2 thick.
     RunoutThickness,
     /// Final height over r0.
     Height,
@@ -46,12 +47,10 @@ impl Measure {
 pub struct Run {
     /// Run folder.
     pub folder: PathBuf,
-    /// Material particles.
-    pub particles: u64,
-    /// Ranks it ran on.
-    pub ranks: u32,
-    /// Wall time of all stages, s; none where an earlier run was used.
-    pub seconds: Option<f64>,
+    /// Initial spacing of the particles, m.
+    pub spacing: f64,
+    /// Which sources computed it, when, and from which scene.
+    pub record: Record,
 }
 
 /// Final thickness over the distance from the origin.
@@ -80,10 +79,59 @@ pub fn measure(measure: Measure, run: &Run, validation: &Validation) -> Result<f
 
 fn number(post: &Path, key: &str) -> Result<f64, Failure> {
     let path = post.join("summary.json");
+    let missing =
+        || Failure::no_input(format!("{}: `{key}` is not a number there", crate::paths::short(&path).display()));
+    summary(post)?.get(key).and_then(Value::as_f64).ok_or_else(missing)
+}
+
+/// `post/summary.json`: null where the scene has no meaning for a number.
+fn summary(post: &Path) -> Result<Value, Failure> {
+    let path = post.join("summary.json");
     let fault = |e: String| Failure::no_input(format!("{}: {e}", crate::paths::short(&path).display()));
     let text = std::fs::read_to_string(&path).map_err(|e| fault(e.to_string()))?;
-    let summary: serde_json::Value = serde_json::from_str(&text).map_err(|e| fault(e.to_string()))?;
-    summary.get(key).and_then(serde_json::Value::as_f64).ok_or_else(|| fault(format!("`{key}` is not a number there")))
+    serde_json::from_str(&text).map_err(|e| fault(e.to_string()))
+}
+
+/// What a table shows of every run, judged or not; none where the scene has no meaning for it.
+#[derive(Debug, Default)]
+pub struct Overview {
+    /// (r - r0)/r0 with r the furthest particle, the radius of 99.5 % of the mass, and that of thickness dx/2.
+    pub runouts: [Option<f64>; 3],
+    /// Final height over r0.
+    pub height: Option<f64>,
+    /// Volume over the volume at the initial density.
+    pub volume_ratio: Option<f64>,
+    /// Force on the floor over the weight.
+    pub basal_force: Option<f64>,
+    /// How far the front of 99.5 % of the mass moved during the last T = sqrt(H0/g), over r0.
+    pub front_last: Option<f64>,
+    /// Final kinetic energy over its largest.
+    pub kinetic_over_peak: Option<f64>,
+    /// Material particles.
+    pub particles: Option<u64>,
+    /// Particles across the radius or length of the column.
+    pub resolution: Option<f64>,
+}
+
+/// Reads the overview of a run.
+pub fn overview(run: &Run) -> Result<Overview, Failure> {
+    let summary = summary(&RunFolder::new(&run.folder).post())?;
+    Ok(overview_of(&summary, run.spacing))
+}
+
+fn overview_of(summary: &Value, spacing: f64) -> Overview {
+    let number = |key: &str| summary.get(key).and_then(Value::as_f64);
+    let over_r0 = |length: f64| number("r0_m").map(|r0| length / r0);
+    Overview {
+        runouts: ["runout_furthest", "runout_mass_99_5", "runout_thickness"].map(number),
+        height: number("final_height_m").and_then(over_r0),
+        volume_ratio: number("volume_ratio"),
+        basal_force: number("basal_force_over_weight"),
+        front_last: number("front_mass_last_T"),
+        kinetic_over_peak: number("kinetic_over_peak"),
+        particles: summary.get("particles").and_then(Value::as_u64),
+        resolution: number("r0_m").map(|r0| r0 / spacing),
+    }
 }
 
 impl Profile {
@@ -174,6 +222,15 @@ mod tests {
         assert_eq!(Profile::parse("x,h\n0,0.1\n1,NaN\n", None).unwrap().front(0.1), 0.0);
         assert!(Profile::parse("x,h\n0;1\n", None).unwrap_err().contains("line 2"));
         assert!(Profile::parse("x,h\n", None).is_err());
+    }
+
+    #[test]
+    fn what_a_summary_has_not_is_left_open() {
+        let text = r#"{"r0_m": 0.1, "final_height_m": 0.05, "runout_thickness": 1.2, "front_mass_last_T": null}"#;
+        let shown = overview_of(&serde_json::from_str(text).unwrap(), 0.004);
+        assert_eq!((shown.height, shown.resolution), (Some(0.5), Some(25.0)));
+        assert_eq!(shown.runouts, [None, None, Some(1.2)]);
+        assert_eq!((shown.front_last, shown.kinetic_over_peak, shown.particles), (None, None, None));
     }
 
     #[test]

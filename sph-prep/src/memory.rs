@@ -1,0 +1,150 @@
+//! What a run needs of memory, and whether it is there: a slip in the spacing is refused before anything is made.
+
+use crate::{failure::Failure, shape::Lattice, summary, wall};
+use formats::{scene::Scene, space::Space};
+use mpi::{collective::SystemOperation, traits::*};
+
+/// Memory `sph-run` needs for a particle, virtual ones included, bytes: state, rates, neighbour list and buffers of
+/// the halo. Measured at about 1350 on columns of 10^5 to 10^6 particles.
+pub const BYTES_PER_PARTICLE: u64 = 1400;
+
+/// Memory a rank needs whatever it computes, bytes: the program, MPI and HDF5. Measured.
+pub const BYTES_PER_RANK: u64 = 45_000_000;
+
+/// Number of particles of a scene, found without counting them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Load {
+    /// Particles of the bodies.
+    pub particles: u64,
+    /// Virtual particles of walls within reach at the start.
+    pub walls: u64,
+}
+
+impl Load {
+    /// Estimates a scene from the volumes of its bodies.
+    pub fn of(scene: &Scene, lattices: &[Lattice]) -> Self {
+        let particles = lattices.iter().map(Lattice::estimate).sum();
+        Self { particles, walls: wall::within_reach(scene, lattices) }
+    }
+
+    /// Bytes `sph-run` is expected to need on that many ranks, all together.
+    pub fn bytes(self, ranks: u64) -> u64 {
+        (self.particles + self.walls) * BYTES_PER_PARTICLE + ranks * BYTES_PER_RANK
+    }
+}
+
+/// Memory that is free for each rank, bytes: the least over the machines of the job, each shared by its own ranks.
+/// Infinite where the system doesn't tell. Collective.
+pub fn room(comm: &impl Communicator) -> f64 {
+    let here = comm.split_shared(comm.rank()).size();
+    let told = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| available(&text));
+    let mine = told.map_or(f64::INFINITY, |bytes| bytes as f64 / f64::from(here));
+    let mut least = mine;
+    comm.all_reduce_into(&mine, &mut least, SystemOperation::min());
+    least
+}
+
+/// Bytes available, from the text of /proc/meminfo.
+fn available(meminfo: &str) -> Option<u64> {
+    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
+}
+
+/// Refuses a scene that needs more than `room` bytes on each of `ranks` ranks.
+///
+/// # Errors
+/// [`Failure::TooLarge`], with a spacing that would fit.
+pub fn check(scene: &Scene, load: Load, room: f64, ranks: u64) -> Result<(), Failure> {
+    let available = room * ranks as f64;
+    if load.bytes(ranks) as f64 <= available {
+        return Ok(());
+    }
+    let advice = match fitting(scene, load, available, ranks) {
+        Some(spacing) => format!("a spacing of {} m would fit", summary::short(spacing)),
+        None => "use fewer ranks, or a machine with more memory".to_owned(),
+    };
+    let (particles, needed) = (load.particles, summary::size(load.bytes(ranks)));
+    Err(Failure::TooLarge { particles, needed, available: summary::size(available as u64), advice })
+}
+
+/// The scene's smallest spacing of two digits that needs no more than `available` bytes; none where the ranks by
+/// themselves need more.
+fn fitting(scene: &Scene, load: Load, available: f64, ranks: u64) -> Option<f64> {
+    let left = available - (ranks * BYTES_PER_RANK) as f64;
+    let particles = ((load.particles + load.walls) * BYTES_PER_PARTICLE) as f64;
+    let dimension = if scene.space == Space::ThreeD { 3.0 } else { 2.0 };
+    if left <= 0.0 {
+        return None;
+    }
+    let mut trial = scene.clone();
+    // Walls grow more slowly than bodies, so that the first guess may be a little too fine.
+    let mut guess = scene.spacing * (particles / left).powf(1.0 / dimension);
+    for _ in 0..50 {
+        let digit = 10f64.powf(guess.log10().floor() - 1.0);
+        trial.spacing = (guess / digit).ceil() * digit;
+        let lattices = crate::fill::lattices(&trial);
+        let load = Load::of(&trial, &lattices);
+        if load.bytes(ranks) as f64 <= available {
+            return (load.particles > 0).then_some(trial.spacing);
+        }
+        guess = trial.spacing * 1.02;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{fill, testing::scene};
+    use formats::scene::{Shape, Slip, Wall};
+
+    fn block(space: Space, spacing: f64) -> Scene {
+        let mut scene = scene(space, spacing, Shape::Box { min: [0.0; 3], max: [0.1; 3] });
+        scene.walls.push(Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip });
+        scene
+    }
+
+    fn load(scene: &Scene) -> Load {
+        Load::of(scene, &fill::lattices(scene))
+    }
+
+    #[test]
+    fn the_estimate_is_close_to_the_count() {
+        for space in [Space::PlaneStrain, Space::Axisymmetric, Space::ThreeD] {
+            let scene = block(space, 0.01);
+            assert_eq!(load(&scene).particles, fill::serial(&scene).len() as u64, "{space:?}");
+        }
+        let load = load(&block(Space::ThreeD, 0.01));
+        assert_eq!(load.bytes(2), (load.particles + load.walls) * 1400 + 90_000_000);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_with_a_spacing_that_does() {
+        for space in [Space::PlaneStrain, Space::Axisymmetric, Space::ThreeD] {
+            let scene = block(space, 1e-6);
+            let room = 8e9;
+            let failure = check(&scene, load(&scene), room, 3).unwrap_err();
+            assert_eq!(failure.exit_code(), 2);
+            assert!(failure.to_string().contains(&load(&scene).particles.to_string()), "{failure}");
+            let spacing = fitting(&scene, load(&scene), 3.0 * room, 3).unwrap();
+            let coarser = block(space, spacing);
+            assert!(check(&coarser, load(&coarser), room, 3).is_ok(), "{spacing}");
+            assert!(load(&coarser).bytes(3) as f64 > 0.7 * 3.0 * room, "no coarser than needed: {spacing}");
+            assert!(check(&scene, load(&scene), f64::INFINITY, 3).is_ok());
+        }
+    }
+
+    #[test]
+    fn ranks_alone_may_need_too_much() {
+        let scene = block(Space::PlaneStrain, 0.01);
+        let failure = check(&scene, load(&scene), 1e6, 1).unwrap_err();
+        assert!(failure.to_string().contains("fewer ranks"), "{failure}");
+    }
+
+    #[test]
+    fn the_available_memory_is_read() {
+        let text = "MemTotal:       24684092 kB\nMemFree: 1 kB\nMemAvailable:   23936684 kB\n";
+        assert_eq!(available(text), Some(23_936_684 * 1024));
+        assert_eq!(available("MemTotal: 3 kB\n"), None);
+    }
+}
