@@ -1,4 +1,5 @@
-//! What a run needs of memory, and whether it is there: a slip in the spacing is refused before anything is made.
+//! What a run needs of memory, and whether this machine can prepare it: a slip in the spacing is refused before
+//! anything is made. Only the preparation's own need is held against this machine; the run may go to a larger one.
 
 use crate::{failure::Failure, shape::Lattice, summary, wall};
 use formats::{scene::Scene, space::Space};
@@ -7,6 +8,9 @@ use mpi::{collective::SystemOperation, traits::*};
 /// Memory `sph-run` needs for a particle, virtual ones included, bytes: state, rates, neighbour list and buffers of
 /// the halo. Measured at about 1350 on columns of 10^5 to 10^6 particles.
 pub const BYTES_PER_PARTICLE: u64 = 1400;
+
+/// Memory the preparation needs for a particle, bytes: its row of 144 bytes, and what HDF5 and the exchange copy.
+pub const BYTES_TO_PREPARE: u64 = 400;
 
 /// Memory a rank needs whatever it computes, bytes: the program, MPI and HDF5. Measured.
 pub const BYTES_PER_RANK: u64 = 45_000_000;
@@ -31,6 +35,11 @@ impl Load {
     pub fn bytes(self, ranks: u64) -> u64 {
         (self.particles + self.walls) * BYTES_PER_PARTICLE + ranks * BYTES_PER_RANK
     }
+
+    /// Bytes the preparation needs on that many ranks, all together.
+    fn preparing(self, ranks: u64) -> u64 {
+        self.particles * BYTES_TO_PREPARE + ranks * BYTES_PER_RANK
+    }
 }
 
 /// Memory that is free for each rank, bytes: the least over the machines of the job, each shared by its own ranks.
@@ -50,20 +59,20 @@ fn available(meminfo: &str) -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
 }
 
-/// Refuses a scene that needs more than `room` bytes on each of `ranks` ranks.
+/// Refuses a scene whose preparation needs more than `room` bytes on each of `ranks` ranks.
 ///
 /// # Errors
 /// [`Failure::TooLarge`], with a spacing that would fit.
 pub fn check(scene: &Scene, load: Load, room: f64, ranks: u64) -> Result<(), Failure> {
     let available = room * ranks as f64;
-    if load.bytes(ranks) as f64 <= available {
+    if load.preparing(ranks) as f64 <= available {
         return Ok(());
     }
     let advice = match fitting(scene, load, available, ranks) {
         Some(spacing) => format!("a spacing of {} m would fit", summary::short(spacing)),
         None => "use fewer ranks, or a machine with more memory".to_owned(),
     };
-    let (particles, needed) = (load.particles, summary::size(load.bytes(ranks)));
+    let (particles, needed) = (load.particles, summary::size(load.preparing(ranks)));
     Err(Failure::TooLarge { particles, needed, available: summary::size(available as u64), advice })
 }
 
@@ -71,20 +80,20 @@ pub fn check(scene: &Scene, load: Load, room: f64, ranks: u64) -> Result<(), Fai
 /// themselves need more.
 fn fitting(scene: &Scene, load: Load, available: f64, ranks: u64) -> Option<f64> {
     let left = available - (ranks * BYTES_PER_RANK) as f64;
-    let particles = ((load.particles + load.walls) * BYTES_PER_PARTICLE) as f64;
+    let particles = (load.particles * BYTES_TO_PREPARE) as f64;
     let dimension = if scene.space == Space::ThreeD { 3.0 } else { 2.0 };
     if left <= 0.0 {
         return None;
     }
     let mut trial = scene.clone();
-    // Walls grow more slowly than bodies, so that the first guess may be a little too fine.
+    // Rounding to whole cells may make the first guess a little too fine.
     let mut guess = scene.spacing * (particles / left).powf(1.0 / dimension);
     for _ in 0..50 {
         let digit = 10f64.powf(guess.log10().floor() - 1.0);
         trial.spacing = (guess / digit).ceil() * digit;
         let lattices = crate::fill::lattices(&trial);
         let load = Load::of(&trial, &lattices);
-        if load.bytes(ranks) as f64 <= available {
+        if load.preparing(ranks) as f64 <= available {
             return (load.particles > 0).then_some(trial.spacing);
         }
         guess = trial.spacing * 1.02;
@@ -129,7 +138,7 @@ mod tests {
             let spacing = fitting(&scene, load(&scene), 3.0 * room, 3).unwrap();
             let coarser = block(space, spacing);
             assert!(check(&coarser, load(&coarser), room, 3).is_ok(), "{spacing}");
-            assert!(load(&coarser).bytes(3) as f64 > 0.7 * 3.0 * room, "no coarser than needed: {spacing}");
+            assert!(load(&coarser).preparing(3) as f64 > 0.7 * 3.0 * room, "no coarser than needed: {spacing}");
             assert!(check(&scene, load(&scene), f64::INFINITY, 3).is_ok());
         }
     }
