@@ -251,7 +251,7 @@ fn what_is_allowed_at_the_borders_is_read() {
     // The default of h/dx depends on the kernel.
     let scene = good(COLUMN, "[end]", "[kernel]\nkind = \"wendland-c2\"\n[end]");
     assert_eq!((scene.kernel, scene.h_over_dx), (Kernel::WendlandC2, 1.5625));
-    good(COLUMN, "[end]", "[kernel]\nh-over-dx = 3\n[numerics]\ncourant = 0.7\n[end]");
+    good(COLUMN, "[end]", "[kernel]\nh-over-dx = 3\n[numerics]\ncourant = 0.3\n[end]");
     good(PLANE, "[end]", "[numerics]\ncourant = 1.7\n[end]");
     // A ceiling a whole number of spacings above the floor, and an outer cylinder.
     let ceiling = "[wall.ceiling]\naxis = \"z\"\nat = \"0.3 m\"\nside = \"below\"\nslip = \"free-slip\"\n";
@@ -273,7 +273,7 @@ fn values_out_of_range() {
     bad(COLUMN, "cohesion", dilation, (9, 12), &format!("{c}dilation"), "in [0, 30] degrees");
     bad(EVERYTHING, "1.5\n", "0.9\n", (9, 13), "kernel.h-over-dx", "in [1, 3]");
     bad(EVERYTHING, "courant = 0.3", "courant = 1.8", (50, 11), "numerics.courant", "in (0, 1.7]");
-    bad(EVERYTHING, "viscosity = 0.2", "viscosity = -1", (51, 13), "numerics.viscosity", "0 or greater");
+    bad(EVERYTHING, "viscosity = 0.2", "viscosity = -1", (51, 13), "numerics.viscosity", "in [0, 1]");
     bad(EVERYTHING, "\"2 1/s\"", "\"-2 1/s\"", (52, 11), "numerics.damping", "0 or greater");
     bad(EVERYTHING, "jitter = 0.1", "jitter = 0.5", (46, 10), "initial.jitter", "in [0, 0.5)");
     bad(EVERYTHING, "seed = 7", "seed = -7", (47, 8), "initial.seed", "`-7` is not a whole number");

@@ -96,7 +96,7 @@ impl Geometry {
     pub fn kernel_volume(&self, x: [f64; 3], volume: f64) -> f64 {
         match self.space {
             // On the axis itself the area of a ring says nothing.
-            Space::Axisymmetric => volume / (2.0 * PI * x[0].max(0.25 * self.dx)),
+            Space::Axisymmetric => volume / (2.0 * PI * x[0].max(0.5 * self.dx)),
             _ => volume,
         }
     }

@@ -87,7 +87,7 @@ impl Neighbors {
     }
 }
 
-/// A grid of cells at least `reach` wide over the bounding box of all particles.
+/// A grid of cells at least `reach` wide. Its outermost cells reach to infinity.
 struct Cells<const D: usize> {
     low: Vector<D>,
     width: f64,
@@ -98,8 +98,9 @@ struct Cells<const D: usize> {
 
 impl<const D: usize> Cells<D> {
     fn new(x: &[Vector<D>], by_key: &[u32], reach: f64) -> Self {
-        let (low, high) = bounds(x);
-        // A few particles far out must not make millions of empty cells: widen the cells until there are few.
+        // A few particles far out must not make millions of empty cells: the grid covers where nearly all are, and its
+        // outermost cells take in the rest. Should that not do, the cells are widened.
+        let (low, high) = bulk(x);
         let mut width = reach;
         let shape = |width: f64| -> [usize; D] {
             std::array::from_fn(|a| (((high.0[a] - low.0[a]) / width).max(0.0) as usize).saturating_add(1))
@@ -156,6 +157,22 @@ impl<const D: usize> Cells<D> {
             at[1..axis].copy_from_slice(&low[1..axis]);
         }
     }
+}
+
+/// Lower and upper corner of a box that holds all but a thousandth of some points on each side of each axis.
+fn bulk<const D: usize>(x: &[Vector<D>]) -> (Vector<D>, Vector<D>) {
+    let few = x.len() / 1000;
+    let (mut low, mut high) = bounds(x);
+    if few > 0 {
+        let mut along: Vec<f64> = Vec::with_capacity(x.len());
+        for a in 0..D {
+            along.clear();
+            along.extend(x.iter().map(|p| p.0[a]));
+            low.0[a] = *along.select_nth_unstable_by(few, f64::total_cmp).1;
+            high.0[a] = *along.select_nth_unstable_by(x.len() - 1 - few, f64::total_cmp).1;
+        }
+    }
+    (low, high)
 }
 
 /// Lower and upper corner of the box around some points; zeros where there are none.

@@ -93,10 +93,9 @@ pub const PERFORMANCE_HEAD: &str =
     "time [s],step [1],wall [s],particle_steps_per_second [1/s],imbalance [1],ranks [1]\n";
 
 /// Writes the index of the snapshots, which ParaView opens as a series in time.
-pub fn write_series(folder: &RunFolder, times: &[f64]) -> Result<(), RunError> {
-    let name = |k: usize| folder.snapshot(k as u64).file_name().map(|n| n.to_string_lossy().into_owned());
-    let files: Vec<_> =
-        times.iter().enumerate().map(|(k, time)| serde_json::json!({ "name": name(k), "time": time })).collect();
+pub fn write_series(folder: &RunFolder, times: &[(u64, f64)]) -> Result<(), RunError> {
+    let name = |k: u64| folder.snapshot(k).file_name().map(|n| n.to_string_lossy().into_owned());
+    let files: Vec<_> = times.iter().map(|&(k, time)| serde_json::json!({ "name": name(k), "time": time })).collect();
     let series = serde_json::json!({ "file-series-version": "1.0", "files": files });
     replace(&folder.series(), &format!("{series:#}\n"))
 }

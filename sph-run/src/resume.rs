@@ -97,7 +97,8 @@ fn clock_from_json(value: &serde_json::Value, step: u64) -> Option<Clock> {
 pub struct Files {
     pub history: Growing,
     pub performance: Growing,
-    pub snapshot_times: Vec<f64>,
+    /// Number and time of every snapshot that is there.
+    pub snapshot_times: Vec<(u64, f64)>,
 }
 
 impl Files {
@@ -111,7 +112,10 @@ impl Files {
         let log = folder.log().join("performance.csv");
         let logged = if start.fresh() { 0 } else { std::fs::metadata(&log).map_or(0, |m| m.len()) };
         let performance = Growing::open(&log, logged, output::PERFORMANCE_HEAD)?;
-        let times = (0..start.clock.snapshots).map(|k| snapshot::read_header(&folder.snapshot(k)).map(|h| h.time));
+        // A user may have moved earlier snapshots away to save space: the index lists what is there.
+        let times = (0..start.clock.snapshots)
+            .filter(|&k| folder.snapshot(k).exists())
+            .map(|k| snapshot::read_header(&folder.snapshot(k)).map(|header| (k, header.time)));
         Ok(Self { history, performance, snapshot_times: times.collect::<Result<_, _>>()? })
     }
 }

@@ -183,7 +183,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         let files = &mut self.files;
         agree(self.job.comm, || {
             let Some(files) = files else { return Ok(()) };
-            files.snapshot_times.push(clock.time);
+            files.snapshot_times.push((clock.snapshots - 1, clock.time));
             output::write_series(folder, &files.snapshot_times)?;
             let (time, step) = (clock.time, clock.step);
             files.performance.append(&format!("{time:e},{step},{wall:.3},{rate:.4e},{imbalance:.4},{ranks}\n"))

@@ -13,11 +13,9 @@ pub trait Space<const D: usize, const N: usize>: Copy + Debug + Default + Send +
     /// Its name on disk.
     const KIND: Kind;
 
-    /// Weight w of a place in volume integrals: dV = w dA up to a constant.
-    fn metric(x: Vector<D>) -> f64;
-
-    /// The metric with which mass was turned into volume: w, kept away from zero near the axis.
-    fn mass_metric(x: Vector<D>, spacing: f64) -> f64;
+    /// Weight w of a place in volume integrals: dV = w dA up to a constant. 1, or the radius in the axisymmetric space:
+    /// kept away from zero, and signed, so that images across the axis have negative ones.
+    fn metric(x: Vector<D>, spacing: f64) -> f64;
 
     /// V = mass/(density w'), where w' is w times the constant (2 pi r in the axisymmetric space).
     fn volume(mass: f64, density: f64, x: Vector<D>, spacing: f64) -> f64;
@@ -114,10 +112,7 @@ macro_rules! plane_layout {
 
 impl Space<2, 4> for PlaneStrain {
     const KIND: Kind = Kind::PlaneStrain;
-    fn metric(_: Vector<2>) -> f64 {
-        1.0
-    }
-    fn mass_metric(_: Vector<2>, _: f64) -> f64 {
+    fn metric(_: Vector<2>, _: f64) -> f64 {
         1.0
     }
     fn volume(mass: f64, density: f64, _: Vector<2>, _: f64) -> f64 {
@@ -132,19 +127,16 @@ impl Space<2, 4> for PlaneStrain {
     plane_layout!();
 }
 
-/// Radius kept away from zero where it divides: the first ring lies at dx/2.
+/// Radius kept away from zero where it divides: not below dx/2, where the first ring lies at the start. A ring at r
+/// swings at c/r, and the largest stable time step falls with it.
 fn radius(x: Vector<2>, spacing: f64) -> f64 {
-    x.0[0].abs().max(0.25 * spacing)
+    x.0[0].abs().max(0.5 * spacing)
 }
 
 impl Space<2, 4> for Axisymmetric {
     const KIND: Kind = Kind::Axisymmetric;
-    /// Signed: images across the axis have negative radii.
-    fn metric(x: Vector<2>) -> f64 {
-        x.0[0]
-    }
-    fn mass_metric(x: Vector<2>, spacing: f64) -> f64 {
-        radius(x, spacing)
+    fn metric(x: Vector<2>, spacing: f64) -> f64 {
+        radius(x, spacing).copysign(x.0[0])
     }
     fn volume(mass: f64, density: f64, x: Vector<2>, spacing: f64) -> f64 {
         mass / (TAU * radius(x, spacing) * density)
@@ -160,10 +152,7 @@ impl Space<2, 4> for Axisymmetric {
 
 impl Space<3, 6> for ThreeD {
     const KIND: Kind = Kind::ThreeD;
-    fn metric(_: Vector<3>) -> f64 {
-        1.0
-    }
-    fn mass_metric(_: Vector<3>, _: f64) -> f64 {
+    fn metric(_: Vector<3>, _: f64) -> f64 {
         1.0
     }
     fn volume(mass: f64, density: f64, _: Vector<3>, _: f64) -> f64 {

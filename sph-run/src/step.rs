@@ -71,7 +71,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         let spacing = self.parameters.spacing;
         let p = &mut self.particles;
         self.weighted.clear();
-        self.weighted.extend(p.stress.iter().zip(&p.x).map(|(&s, &x): (&Sym<N>, &Vector<D>)| s * P::Space::metric(x)));
+        self.weighted
+            .extend(p.stress.iter().zip(&p.x).map(|(&s, &x): (&Sym<N>, &Vector<D>)| s * P::Space::metric(x, spacing)));
         let mut a = std::mem::take(&mut p.a);
         sweep::momentum::<D, N, P::Space, P::Kernel>(p, &self.neighbors, self.parameters.pairs, &self.weighted, &mut a);
         for (i, a) in a.iter_mut().enumerate() {

@@ -9,7 +9,7 @@
 //! a_i      = 1/(rho_i w_i) sum_j V_j [w_i sigma_i + w_j sigma_j + viscosity] . grad_i W_ij  (+ hoop term + g)
 //! ```
 //!
-//! The force between two particles is antisymmetric in i and j, and its power is minus the power of the stress on the
+//! The force between two particles of the material is antisymmetric in i and j, and its power is minus the power of the stress on the
 //! velocity gradient, to rounding: sum m v.a = -sum w V sigma:D.
 
 use crate::algebra::{Matrix, Sym, Vector};
@@ -84,7 +84,7 @@ pub fn momentum<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
     let nearest = 1e-6 * pairs.h * pairs.h;
     for (i, acceleration) in acceleration.iter_mut().enumerate() {
         let (x, v, own) = (particles.x[i], particles.v[i], weighted[i]);
-        let metric = S::metric(x);
+        let metric = S::metric(x, pairs.spacing);
         let mut sum = Vector::default();
         for &j in neighbors.of_owned.of(i) {
             let j = j as usize;
@@ -94,13 +94,13 @@ pub fn momentum<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
                 let slope = scales.slope * K::KIND.slope_over_q(r2.sqrt() * scales.per_h);
                 let approach = (v - particles.v[j]).dot(d).min(0.0) / r2.max(nearest);
                 // Image rings have negative radii; the mean distance from the axis weighs the viscosity.
-                let mean_metric = 0.5 * (metric.abs() + S::metric(particles.x[j]).abs());
+                let mean_metric = 0.5 * (metric.abs() + S::metric(particles.x[j], pairs.spacing).abs());
                 let stress = S::traction(&(own + weighted[j]), d);
                 let pair = stress + d * (pairs.viscosity * mean_metric * approach);
                 sum += pair * (particles.volume[j] * slope);
             }
         }
-        *acceleration = sum * (1.0 / (particles.density[i] * S::mass_metric(x, pairs.spacing)));
+        *acceleration = sum * (1.0 / (particles.density[i] * metric));
     }
 }
 

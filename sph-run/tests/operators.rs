@@ -63,7 +63,7 @@ fn sweep_all<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
     let pairs = Pairs { h, spacing: 1.0, viscosity };
     let mut gradient = vec![Matrix::default(); p.owned];
     sweep::velocity_gradient::<D, N, K>(p, &neighbors, pairs, &mut gradient);
-    let weighted: Vec<_> = p.stress.iter().zip(&p.x).map(|(&s, &x)| s * S::metric(x)).collect();
+    let weighted: Vec<_> = p.stress.iter().zip(&p.x).map(|(&s, &x)| s * S::metric(x, 1.0)).collect();
     let mut acceleration = vec![Vector::default(); p.owned];
     sweep::momentum::<D, N, S, K>(p, &neighbors, pairs, &weighted, &mut acceleration);
     Swept { gradient, acceleration }

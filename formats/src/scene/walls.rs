@@ -4,6 +4,7 @@
 //! A site's place and number follow from its lattice coordinates alone, the same on every rank.
 
 use super::{Scene, Slip, Wall};
+use crate::space::Space;
 
 /// Lattice coordinates of a site; unused axes are zero.
 pub type Site = [i32; 3];
@@ -22,7 +23,9 @@ impl WallLattice {
     pub fn new(scene: &Scene) -> Self {
         let mut origin = [0.0; 3];
         for axis in 0..3 {
-            let symmetric = axis < 2 && scene.symmetry[axis];
+            // The axis of r-z is a plane of symmetry too: sites across it must be images of each other.
+            let axis_of_rings = axis == 0 && scene.space == Space::Axisymmetric;
+            let symmetric = axis_of_rings || (axis < 2 && scene.symmetry[axis]);
             if let (false, Some(wall)) = (symmetric, scene.walls.iter().find(|w| w.axis == axis)) {
                 origin[axis] = wall.at;
             }
@@ -56,7 +59,7 @@ impl WallLattice {
     }
 
     /// What the wall does to a velocity and a stress extrapolated to `x` from the material. Behind free-slip walls
-    /// both are reflected; behind any no-slip wall the velocity is reversed (Yang et al. 2020, Eqs 31, 32, with the
+    /// both are reflected; behind any no-slip wall the velocity is then reversed (Yang et al. 2020, Eqs 31, 32, with the
     /// correction that only shear components with one normal index change sign).
     /// Returns the factors for the velocity's components, and whether each axis is reflected in the stress.
     pub fn parity(&self, x: [f64; 3]) -> ([f64; 3], [bool; 3]) {
@@ -71,7 +74,7 @@ impl WallLattice {
             }
         }
         if stuck {
-            velocity = [-1.0; 3];
+            velocity = velocity.map(|factor| -factor);
         }
         (velocity, reflected)
     }

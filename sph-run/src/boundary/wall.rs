@@ -44,10 +44,13 @@ impl Walls {
     pub fn create<const D: usize, const N: usize, S: Space<D, N>>(&mut self, p: &mut Particles<D, N>, reach: f64) {
         debug_assert_eq!(p.mirror, p.len());
         let mut sites: Vec<(u64, Site)> = Vec::new();
+        let mut limit = 1 << 20;
         for i in 0..p.owned {
             self.lattice.near(S::to_disk(p.x[i]), reach, |site| sites.push((WallLattice::id(site), site)));
-            if sites.len() > 1 << 20 {
+            // Neighbours name the same sites again and again: forget the copies before they fill the memory.
+            if sites.len() > limit {
                 unique(&mut sites);
+                limit = limit.max(2 * sites.len());
             }
         }
         unique(&mut sites);
