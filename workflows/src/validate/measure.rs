@@ -15,6 +15,8 @@ pub enum Measure {
     Runout,
     /// (r - r0)/r0, with r up to which the deposit is at least dx/2 thick.
     RunoutThickness,
+    /// r/r0, with r up to which the deposit is at least dx/2 thick.
+    Front,
     /// Final height over r0.
     Height,
     /// Volume over the volume at the start.
@@ -33,6 +35,7 @@ impl Measure {
         match self {
             Self::Runout => "run-out (99.5 % of mass)",
             Self::RunoutThickness => "run-out (thickness)",
+            Self::Front => "front/r0 (thickness)",
             Self::Height => "height/r0",
             Self::VolumeRatio => "volume ratio",
             Self::BasalForce => "basal force/weight",
@@ -66,6 +69,7 @@ pub fn measure(measure: Measure, run: &Run, validation: &Validation) -> Result<f
     match measure {
         Measure::Runout => number(&post, "runout_mass_99_5"),
         Measure::RunoutThickness => number(&post, "runout_thickness"),
+        Measure::Front => Ok(number(&post, "final_front_thickness_m")? / number(&post, "r0_m")?),
         Measure::Height => Ok(number(&post, "final_height_m")? / number(&post, "r0_m")?),
         Measure::VolumeRatio => number(&post, "volume_ratio"),
         Measure::BasalForce => number(&post, "basal_force_over_weight"),

@@ -107,11 +107,16 @@ pub struct Verdict {
     pub within: Option<bool>,
 }
 
-/// A check against its limit. The run-out is judged by the thickness of the deposit; the one by mass is shown below it.
+/// A check against its limit, with other definitions of the same front below it: shown, not judged.
 fn judge(validation: &Validation, check: &Check, runs: &BTreeMap<String, Run>) -> Result<Vec<Verdict>, Failure> {
     let mut verdicts = vec![judged(validation, check, check.measure, runs)?];
-    if check.measure == Measure::RunoutThickness {
-        let shown = judged(validation, check, Measure::Runout, runs)?;
+    let beside: &[Measure] = match check.measure {
+        Measure::RunoutThickness => &[Measure::Runout],
+        Measure::Front => &[Measure::RunoutThickness, Measure::Runout],
+        _ => &[],
+    };
+    for &measure in beside {
+        let shown = judged(validation, check, measure, runs)?;
         verdicts.push(Verdict { limit: "–".into(), within: None, ..shown });
     }
     Ok(verdicts)
