@@ -173,7 +173,7 @@ fn the_least_scene_gets_all_defaults() {
         }],
         walls: vec![Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip }],
         initial: Initial { stress: InitialStress::Zero, jitter: 0.0, seed: 1 },
-        numerics: Numerics { courant: 0.6, viscosity: 0.1, damping: 0.0 },
+        numerics: Numerics { courant: 0.6, viscosity: 0.1, damping: 0.0, density_gate: 0.0 },
         end: End { time: 0.35, at_rest: None },
         output: Output { snapshots: 0.35 / 20.0, history: 0.35 / 400.0 },
     };
@@ -212,7 +212,7 @@ fn every_key_is_read() {
             Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip },
         ],
         initial: Initial { stress: InitialStress::K0 { coefficient: 0.43 }, jitter: 0.1, seed: 7 },
-        numerics: Numerics { courant: 0.3, viscosity: 0.2, damping: 2.0 },
+        numerics: Numerics { courant: 0.3, viscosity: 0.2, damping: 2.0, density_gate: 0.0 },
         end: End { time: 2.0, at_rest: Some(1e-4) },
         output: Output { snapshots: 0.02, history: 0.001 },
     };
@@ -253,6 +253,8 @@ fn what_is_allowed_at_the_borders_is_read() {
     assert_eq!((scene.kernel, scene.h_over_dx), (Kernel::WendlandC2, 1.5625));
     good(COLUMN, "[end]", "[kernel]\nh-over-dx = 3\n[numerics]\ncourant = 0.3\n[end]");
     good(PLANE, "[end]", "[numerics]\ncourant = 1.7\n[end]");
+    let scene = good(COLUMN, "[end]", "[numerics]\ndensity-gate = 0.98\n[end]");
+    assert_eq!(scene.numerics.density_gate, 0.98);
     // A ceiling a whole number of spacings above the floor, and an outer cylinder.
     let ceiling = "[wall.ceiling]\naxis = \"z\"\nat = \"0.3 m\"\nside = \"below\"\nslip = \"free-slip\"\n";
     let outer = "[wall.outer]\naxis = \"x\"\nat = \"0.3 m\"\nside = \"below\"\nslip = \"free-slip\"\n";

@@ -25,7 +25,7 @@ pub fn scene(space: Space, spacing: f64, shape: Shape) -> Scene {
         bodies: vec![Body { name: "body".into(), shape, velocity: [0.0; 3] }],
         walls: Vec::new(),
         initial: Initial { stress: InitialStress::Zero, jitter: 0.0, seed: 1 },
-        numerics: Numerics { courant: 0.6, viscosity: 0.1, damping: 0.0 },
+        numerics: Numerics { courant: 0.6, viscosity: 0.1, damping: 0.0, density_gate: 0.0 },
         end: End { time: 1.0, at_rest: None },
         output: Output { snapshots: 0.05, history: 0.01 },
     }

@@ -26,6 +26,8 @@ pub struct Parameters {
     pub sound_speed: f64,
     pub courant: f64,
     pub damping: f64,
+    /// Density below which the material carries no stress, kg/m3.
+    pub gate: f64,
     /// Skin of the neighbour lists, m.
     pub skin: f64,
     pub pairs: Pairs,
@@ -108,6 +110,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
                 sound_speed,
                 courant: scene.numerics.courant,
                 damping: scene.numerics.damping,
+                gate: scene.numerics.density_gate * scene.material.density(),
                 skin: SKIN * h,
                 pairs: Pairs { h, spacing: dx, viscosity },
                 count,

@@ -3,7 +3,7 @@
 //! Eqs 33-39, without the lag of forces their text leaves open.
 
 use crate::algebra::{Sym, Vector};
-use crate::material::Material;
+use crate::material::{Material, gated};
 use crate::parallel::halo::Fields;
 use crate::physics::Physics;
 use crate::simulation::Simulation;
@@ -52,7 +52,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
     /// Density and stress of the owned particles, from the velocity gradient.
     fn update_stress(&mut self, dt: f64) {
-        let spacing = self.parameters.spacing;
+        let (spacing, gate) = (self.parameters.spacing, self.parameters.gate);
         let p = &mut self.particles;
         sweep::velocity_gradient::<D, N, P::Kernel>(p, &self.neighbors, self.parameters.pairs, &mut self.gradient);
         for (i, gradient) in self.gradient.iter().enumerate() {
@@ -61,7 +61,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             let half = (0.5 * strain.trace()).clamp(-0.5, 0.5);
             p.density[i] *= (1.0 - half) / (1.0 + half);
             let turned = self.material.rotate(p.stress[i], P::Space::spin(gradient), dt);
-            p.stress[i] = self.material.stress(turned, strain, &mut p.history[i]);
+            let stress = self.material.stress(turned, strain, &mut p.history[i]);
+            p.stress[i] = gated(stress, p.density[i], gate);
         }
         self.refresh_volumes();
     }

@@ -14,6 +14,8 @@ const FRICTION: Allowed = Allowed { says: "in [0, 90) degrees", holds: |v| (0.0.
 const H_OVER_DX: Allowed = Allowed { says: "in [1, 3]", holds: |v| (1.0..=3.0).contains(&v) };
 const COURANT: Allowed = Allowed { says: "in (0, 1.7]", holds: |v| v > 0.0 && v <= 1.7 };
 const VISCOSITY: Allowed = Allowed { says: "in [0, 1]", holds: |v| (0.0..=1.0).contains(&v) };
+const DENSITY_GATE: Allowed =
+    Allowed { says: "in [0, 1), a fraction of the initial density", holds: |v| (0.0..1.0).contains(&v) };
 const JITTER: Allowed = Allowed { says: "in [0, 0.5), a fraction of the spacing", holds: |v| (0.0..0.5).contains(&v) };
 const AT_REST: Allowed =
     Allowed { says: "in (0, 1), a fraction of the peak kinetic energy", holds: |v| v > 0.0 && v < 1.0 };
@@ -249,6 +251,7 @@ fn numerics(root: &Table<'_>, space: Option<Space>, kernel: Kernel, h_over_dx: f
     let courant = table.number("courant", Dimension::Number, &COURANT);
     let viscosity = table.number("viscosity", Dimension::Number, &VISCOSITY);
     let damping = table.number("damping", Dimension::Rate, &NOT_NEGATIVE);
+    let density_gate = table.number("density-gate", Dimension::Number, &DENSITY_GATE);
     let limit = if space == Some(Space::Axisymmetric) { ring_limit(kernel, h_over_dx) } else { f64::INFINITY };
     // Up to 92 % of the limit is stable in tests; the default keeps 20 % away from it.
     let most = (92.0 * limit).floor() / 100.0;
@@ -265,6 +268,7 @@ fn numerics(root: &Table<'_>, space: Option<Space>, kernel: Kernel, h_over_dx: f
         courant: or(courant, 0.6_f64.min(0.8 * limit)),
         viscosity: or(viscosity, 0.1),
         damping: or(damping, 0.0),
+        density_gate: or(density_gate, 0.0),
     }
 }
 

@@ -198,6 +198,8 @@ pub struct Numerics {
     pub viscosity: f64,
     /// Linear damping of the velocity, 1/s: for columns that settle, not for flows.
     pub damping: f64,
+    /// Density over the initial one below which the material has come apart and carries no stress; 0 switches it off.
+    pub density_gate: f64,
 }
 
 /// When the run is over.

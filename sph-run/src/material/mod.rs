@@ -14,6 +14,14 @@ pub struct History {
     pub plastic_strain: f64,
 }
 
+/// No stress below the density `gate` (Dunatunga & Kamrin 2015, J. Fluid Mech. 779, 483): material that came apart must
+/// close again before it carries. Without the gate a law that integrates rates answers compression at once, whatever
+/// the density, and never gives back the volume it gained in free flight.
+#[inline(always)]
+pub fn gated<const N: usize>(stress: Sym<N>, density: f64, gate: f64) -> Sym<N> {
+    if density < gate { Sym::default() } else { stress }
+}
+
 /// A constitutive law.
 pub trait Material: Copy + Send + Sync {
     /// Stress at the end of a step, Pa.
