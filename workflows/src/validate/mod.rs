@@ -111,6 +111,7 @@ pub struct Verdict {
 fn judge(validation: &Validation, check: &Check, runs: &BTreeMap<String, Run>) -> Result<Vec<Verdict>, Failure> {
     let mut verdicts = vec![judged(validation, check, check.measure, runs)?];
     let beside: &[Measure] = match check.measure {
+        Measure::Runout => &[Measure::RunoutThickness],
         Measure::RunoutThickness => &[Measure::Runout],
         Measure::Front => &[Measure::RunoutThickness, Measure::Runout],
         _ => &[],
