@@ -26,10 +26,6 @@ impl Lists {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Number of indices in all lists.
-    pub fn total(&self) -> usize {
-        self.indices.len()
-    }
     /// Where the list of entry `i` starts among all indices.
     pub fn start(&self, i: usize) -> usize {
         self.starts[i] as usize

@@ -59,8 +59,6 @@ pub struct Partition {
     pub halo: Halo,
     /// Particles of this rank when they had gone home to a new tree; none until then.
     planned: Option<u64>,
-    /// Trees built so far.
-    pub rebuilds: u64,
 }
 
 /// One rank's part of a run.
@@ -119,7 +117,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
             clock,
             particles,
             neighbors: Neighbors::default(),
-            partition: Partition { tree, halo: Halo::default(), planned: None, rebuilds: 1 },
+            partition: Partition { tree, halo: Halo::default(), planned: None },
             mirrors: Mirrors { planes: [scene.symmetry[0] || axisymmetric, scene.symmetry[1]] },
             images: Vec::new(),
             walls: Walls::new(WallLattice::new(scene), dx.powi(D as i32)),
@@ -144,7 +142,6 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
             let owned = &self.particles.x[..self.particles.owned];
             let axes: Vec<usize> = (0..3).filter(|&a| P::Space::axis(a).is_some()).collect();
             self.partition.tree = Tree::build(owned.iter().map(|&x| P::Space::to_disk(x)), None, &axes, self.comm);
-            self.partition.rebuilds += 1;
             self.partition.planned = None;
         }
         self.settle();

@@ -9,8 +9,9 @@
 //! a_i      = 1/(rho_i w_i) sum_j V_j [w_i sigma_i + w_j sigma_j + viscosity] . grad_i W_ij  (+ hoop term + g)
 //! ```
 //!
-//! The force between two particles of the material is antisymmetric in i and j, and its power is minus the power of the stress on the
-//! velocity gradient, to rounding: sum m v.a = -sum w V sigma:D.
+//! The force between two particles of the material is antisymmetric in i and j, and its power is minus the power of the
+//! stress on the velocity gradient, to rounding: sum m v.a = -sum w V sigma:D (test C10). Images across the axis, which
+//! have signed radii, and wall particles by Shepard's interpolation are not exactly conjugate.
 
 use crate::algebra::{Matrix, Sym, Vector};
 use crate::neighbors::Neighbors;
