@@ -67,5 +67,7 @@ fields! {
     MASS "mass" "kg" Scalar Everywhere "Mass; per metre of depth in plane strain, of the whole ring in the axisymmetric space"
     DENSITY "density" "kg/m3" Scalar Everywhere "Density"
     STRESS "stress" "Pa" Symmetric Everywhere "Cauchy stress, tension positive"
+    STRESS_WORK "stress_work" "J/kg" Scalar Everywhere "Work the stress has done on the material's strain, per unit of mass"
+    VISCOUS_WORK "viscous_work" "J/kg" Scalar Everywhere "Heat of the viscosity between particles, per unit of mass"
     PLASTIC_STRAIN "plastic_strain" "1" Scalar Everywhere "Accumulated deviatoric plastic strain"
 }

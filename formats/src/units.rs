@@ -22,6 +22,8 @@ pub enum Dimension {
     Acceleration,
     /// 1/s.
     Rate,
+    /// Pa s.
+    Viscosity,
     /// No unit.
     Number,
 }
@@ -70,6 +72,9 @@ const UNITS: &[Unit] = &[
     decimal("1/s", Dimension::Rate, 0),
     decimal("/s", Dimension::Rate, 0),
     decimal("Hz", Dimension::Rate, 0),
+    decimal("mPa s", Dimension::Viscosity, -3),
+    decimal("Pa s", Dimension::Viscosity, 0),
+    decimal("kPa s", Dimension::Viscosity, 3),
 ];
 
 impl Dimension {
@@ -84,6 +89,7 @@ impl Dimension {
             Self::Velocity => "a velocity",
             Self::Acceleration => "an acceleration",
             Self::Rate => "a rate",
+            Self::Viscosity => "a viscosity",
             Self::Number => "a number without unit",
         }
     }
@@ -104,6 +110,7 @@ impl Dimension {
             Self::Velocity => "\"1 m/s\"",
             Self::Acceleration => "\"9.81 m/s2\"",
             Self::Rate => "\"10 1/s\"",
+            Self::Viscosity => "\"200 Pa s\"",
             Self::Number => "0.3",
         }
     }
@@ -130,7 +137,8 @@ pub fn parse(text: &str, dimension: Dimension) -> Result<f64, String> {
         (Dimension::Number, "") => (0, 1.0, 1.0),
         (_, "") => return Err(format!("`{text}` has no unit; {}", dimension.needed())),
         _ => {
-            let found = UNITS.iter().find(|u| u.name == unit).ok_or_else(|| unknown(&unit, dimension))?;
+            let found =
+                UNITS.iter().find(|u| u.name.replace(' ', "") == unit).ok_or_else(|| unknown(&unit, dimension))?;
             if found.dimension != dimension {
                 return Err(format!("`{text}` is {}; {}", found.dimension.name(), dimension.needed()));
             }
@@ -184,7 +192,7 @@ fn normalised(unit: &str) -> String {
             '³' => plain.push('3'),
             'µ' | 'μ' => plain.push('u'),
             '°' => plain.push_str("deg"),
-            '^' => {}
+            '^' | '*' | '·' => {}
             c if c.is_whitespace() => {}
             c => plain.push(c),
         }

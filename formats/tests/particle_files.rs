@@ -242,7 +242,7 @@ fn changed_files_are_named_for_what_they_are() {
             dataset.write_raw(&values).unwrap();
         }
     };
-    let newer = changed(folder.path(), attribute("format_version", 2));
+    let newer = changed(folder.path(), attribute("format_version", 3));
     assert!(matches!(newer, FileError::Newer { found: 2, known: 1, .. }), "{newer}");
     let damaged = |error: FileError, word: &str| {
         assert!(matches!(error, FileError::Damaged { .. }) && error.to_string().contains(word), "{error}");

@@ -3,8 +3,8 @@
 use formats::{
     kernel::Kernel,
     scene::{
-        Body, Cone, DruckerPrager, End, Fault, Initial, InitialStress, Material, Numerics, Output, Rotation, Scene,
-        Shape, Slip, Wall,
+        Body, Cone, DruckerPrager, End, Fault, Initial, InitialStress, Lattice, Material, MeanStress, Numerics, Output,
+        Rotation, Scene, Shape, Slip, Wall, WallKind,
     },
     space::Space,
 };
@@ -149,6 +149,24 @@ fn bad(scene: &str, from: &str, to: &str, place: (usize, usize), key: &str, phra
     assert!(fault.message.contains(phrase), "{fault:?}");
 }
 
+/// The defaults of the Drucker-Prager law.
+fn numerics() -> Numerics {
+    Numerics {
+        courant: 0.6,
+        viscous_courant: 0.125,
+        viscosity: 0.1,
+        viscosity_on_approach: true,
+        quadratic_viscosity: 0.0,
+        damping: 0.0,
+        density_gate: 0.0,
+        density_diffusion: 0.0,
+        stress_diffusion: 0.0,
+        artificial_stress: 0.0,
+        gradient_correction: false,
+        shifting: 0.0,
+    }
+}
+
 #[track_caller]
 fn good(scene: &str, from: &str, to: &str) -> Scene {
     assert_eq!(scene.matches(from).count(), 1, "{from}");
@@ -163,6 +181,7 @@ fn the_least_scene_gets_all_defaults() {
         spacing: 0.004,
         gravity: [0.0, 0.0, -9.81],
         symmetry: [false; 2],
+        periodic: [None; 3],
         kernel: Kernel::CubicSpline,
         h_over_dx: 1.2,
         material: Material::DruckerPrager(law()),
@@ -171,9 +190,16 @@ fn the_least_scene_gets_all_defaults() {
             shape: Shape::Cylinder { base: [0.0; 3], radius: 0.1, height: 0.1 },
             velocity: [0.0; 3],
         }],
-        walls: vec![Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip }],
-        initial: Initial { stress: InitialStress::Zero, jitter: 0.0, seed: 1 },
-        numerics: Numerics { courant: 0.6, viscosity: 0.1, damping: 0.0, density_gate: 0.0 },
+        walls: vec![Wall {
+            axis: 2,
+            at: 0.0,
+            side: 1.0,
+            slip: Slip::NoSlip,
+            kind: WallKind::Virtual,
+            velocity: [0.0; 3],
+        }],
+        initial: Initial { stress: InitialStress::Zero, lattice: Lattice::Cubic, jitter: 0.0, seed: 1 },
+        numerics: Numerics { courant: 0.6, viscosity: 0.1, damping: 0.0, ..numerics() },
         end: End { time: 0.35, at_rest: None },
         output: Output { snapshots: 0.35 / 20.0, history: 0.35 / 400.0 },
     };
@@ -189,6 +215,7 @@ fn every_key_is_read() {
         spacing: 0.01,
         gravity: [0.0, 0.0, -10.0],
         symmetry: [true; 2],
+        periodic: [None; 3],
         kernel: Kernel::WendlandC2,
         h_over_dx: 1.5,
         material: Material::DruckerPrager(DruckerPrager {
@@ -200,6 +227,7 @@ fn every_key_is_read() {
             cohesion: 1500.0,
             cone: Cone::PlaneStrainIsochoric,
             rotation: Rotation::HughesWinget,
+            mean_stress: MeanStress::Rate,
         }),
         // In the order of the file, not of the alphabet.
         bodies: vec![
@@ -208,11 +236,16 @@ fn every_key_is_read() {
             body("ramp", Shape::Wedge { corner: [0.5, 0.0, 0.0], size: [0.2, 0.1, 0.05], falls_left: true }, [0.0; 3]),
         ],
         walls: vec![
-            Wall { axis: 0, at: 0.5, side: -1.0, slip: Slip::FreeSlip },
-            Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip },
+            Wall { axis: 0, at: 0.5, side: -1.0, slip: Slip::FreeSlip, kind: WallKind::Virtual, velocity: [0.0; 3] },
+            Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip, kind: WallKind::Virtual, velocity: [0.0; 3] },
         ],
-        initial: Initial { stress: InitialStress::K0 { coefficient: 0.43 }, jitter: 0.1, seed: 7 },
-        numerics: Numerics { courant: 0.3, viscosity: 0.2, damping: 2.0, density_gate: 0.0 },
+        initial: Initial {
+            stress: InitialStress::K0 { coefficient: 0.43 },
+            lattice: Lattice::Cubic,
+            jitter: 0.1,
+            seed: 7,
+        },
+        numerics: Numerics { courant: 0.3, viscosity: 0.2, damping: 2.0, ..numerics() },
         end: End { time: 2.0, at_rest: Some(1e-4) },
         output: Output { snapshots: 0.02, history: 0.001 },
     };

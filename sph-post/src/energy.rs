@@ -10,7 +10,7 @@ pub struct Energy {
     pub kinetic: f64,
     /// Sum of -m g . x: zero at the origin.
     pub potential: f64,
-    /// Sum of V sigma : C^-1 : sigma / 2, with the elastic constants of the material.
+    /// Sum of what the material stores: m times [`formats::scene::Material::stored_energy`].
     pub elastic: f64,
     /// Sum of m, kg.
     pub mass: f64,
@@ -25,10 +25,7 @@ impl Energy {
             sum.mass += m;
             sum.kinetic += 0.5 * m * v.iter().map(|v| v * v).sum::<f64>();
             sum.potential -= m * (0..3).map(|a| g.gravity[a] * x[a]).sum::<f64>();
-            let trace = s[0] + s[1] + s[2];
-            let square = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + 2.0 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]);
-            let density = ((1.0 + g.poisson) * square - g.poisson * trace * trace) / (2.0 * g.young);
-            sum.elastic += m / rows.density[row] * density;
+            sum.elastic += m * g.material.stored_energy(s, rows.density[row]);
         }
         sum
     }

@@ -32,10 +32,8 @@ pub struct Geometry {
     pub width: f64,
     /// Density at the start, kg/m3.
     pub density: f64,
-    /// Young's modulus, Pa.
-    pub young: f64,
-    /// Poisson's ratio.
-    pub poisson: f64,
+    /// What the bodies are made of.
+    pub material: Material,
     /// The one body's extent along the profile: where it begins and ends, m. `None` with several bodies.
     pub extent: Option<[f64; 2]>,
     /// Can the one body spread only outward: from the axis, or along +x from the plane of symmetry or the wall it starts
@@ -54,7 +52,6 @@ impl Geometry {
         let mirrored = if scene.space == Space::Axisymmetric { [true, false] } else { scene.symmetry };
         let walls = [(1.0, f64::NEG_INFINITY), (-1.0, f64::INFINITY)]
             .map(|(side, none)| scene.walls.iter().find(|w| w.axis == 0 && w.side == side).map_or(none, |w| w.at));
-        let Material::DruckerPrager(law) = &scene.material;
         let single = if let [body] = &scene.bodies[..] { Some(body) } else { None };
         let extent = single.map(|b| extent(b, scene.space, radial || mirrored[0]));
         let top = scene.bodies.iter().map(|b| b.shape.bounds(scene.space).1[2]).fold(f64::NEG_INFINITY, f64::max);
@@ -69,9 +66,8 @@ impl Geometry {
             walls,
             radial,
             width: width(scene),
-            density: law.density,
-            young: law.young,
-            poisson: law.poisson,
+            material: scene.material.clone(),
+            density: scene.material.density(),
             extent,
             runs_outward: single.zip(extent).is_some_and(|(body, [begin, _])| {
                 let left = if radial || mirrored[0] { 0.0 } else { walls[0] };

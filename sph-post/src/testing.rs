@@ -1,7 +1,12 @@
 //! Blocks of particles for the tests of this crate.
 
 use crate::geometry::Geometry;
-use formats::{kernel::Kernel, snapshot::Rows, space::Space};
+use formats::{
+    kernel::Kernel,
+    scene::{Cone, DruckerPrager, Material, MeanStress, Rotation},
+    snapshot::Rows,
+    space::Space,
+};
 use std::f64::consts::PI;
 
 /// A geometry of density 2000 kg/m3 on a floor at 0, symmetric about x = 0 (and y = 0 in 3-D).
@@ -19,8 +24,17 @@ pub fn geometry(space: Space, kernel: Kernel, dx: f64) -> Geometry {
         radial: space == Space::Axisymmetric,
         width: 1.0,
         density: 2000.0,
-        young: 1e6,
-        poisson: 0.3,
+        material: Material::DruckerPrager(DruckerPrager {
+            density: 2000.0,
+            young: 1e6,
+            poisson: 0.3,
+            friction_deg: 30.0,
+            dilation_deg: 0.0,
+            cohesion: 0.0,
+            cone: Cone::Compression,
+            rotation: Rotation::Jaumann,
+            mean_stress: MeanStress::Rate,
+        }),
         extent: None,
         runs_outward: false,
         height: 0.1,
@@ -58,6 +72,8 @@ pub fn push(rows: &mut Rows, x: [f64; 3], mass: f64, density: f64) {
     rows.mass.push(mass);
     rows.density.push(density);
     rows.stress.push([0.0; 6]);
+    rows.stress_work.push(0.0);
+    rows.viscous_work.push(0.0);
     rows.plastic_strain.push(0.0);
 }
 

@@ -73,13 +73,17 @@ impl Plan {
                     let wanted = numbers.start.max(ids.start)..numbers.end.min(ids.end);
                     for id in wanted {
                         let position = jitter.displace(id, [column.x, column.y, lattice.z(id - numbers.start)]);
+                        let stress = stress.at(&self.lattices, [column.x, column.y], position[2]);
+                        let density = scene.material.density_at(-(stress[0] + stress[1] + stress[2]) / 3.0);
                         rows.id.push(id);
                         rows.body.push(body as u64);
                         rows.position.push(position);
                         rows.velocity.push(scene.bodies[body].velocity);
-                        rows.mass.push(scene.material.density() * lattice.volume(column));
-                        rows.density.push(scene.material.density());
-                        rows.stress.push(stress.at(&self.lattices, [column.x, column.y], position[2]));
+                        rows.mass.push(density * lattice.volume(column));
+                        rows.density.push(density);
+                        rows.stress.push(stress);
+                        rows.stress_work.push(0.0);
+                        rows.viscous_work.push(0.0);
                         rows.plastic_strain.push(0.0);
                     }
                 }
@@ -116,6 +120,8 @@ fn empty(first: u64, capacity: usize) -> Rows {
         mass: Vec::with_capacity(capacity),
         density: Vec::with_capacity(capacity),
         stress: Vec::with_capacity(capacity),
+        stress_work: Vec::with_capacity(capacity),
+        viscous_work: Vec::with_capacity(capacity),
         plastic_strain: Vec::with_capacity(capacity),
     }
 }
@@ -211,6 +217,8 @@ mod tests {
                 all.mass.extend(rows.mass);
                 all.density.extend(rows.density);
                 all.stress.extend(rows.stress);
+                all.stress_work.extend(rows.stress_work);
+                all.viscous_work.extend(rows.viscous_work);
                 all.plastic_strain.extend(rows.plastic_strain);
             }
             assert_eq!(all, one[0], "{size} ranks");

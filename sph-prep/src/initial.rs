@@ -6,8 +6,10 @@ use formats::scene::{InitialStress, Scene};
 /// The rule for the stress at the start.
 #[derive(Clone, Copy, Debug)]
 pub struct Stress {
-    /// Horizontal over vertical stress; none where there is no stress.
+    /// Horizontal over vertical stress of the weight; none where it does not count.
     sideways: Option<f64>,
+    /// The same everywhere, Pa.
+    pressure: f64,
     /// Weight of a unit of volume, N/m3: zero where gravity does not point down.
     weight: f64,
 }
@@ -16,18 +18,25 @@ impl Stress {
     /// The rule of a scene.
     pub fn new(scene: &Scene) -> Self {
         let sideways = match scene.initial.stress {
-            InitialStress::Zero => None,
+            InitialStress::Zero | InitialStress::Pressure(_) => None,
             InitialStress::Hydrostatic => Some(1.0),
             InitialStress::K0 { coefficient } => Some(coefficient),
         };
-        Self { sideways, weight: scene.material.density() * (-scene.gravity[2]).max(0.0) }
+        let pressure = match scene.initial.stress {
+            InitialStress::Pressure(pressure) => pressure,
+            _ => 0.0,
+        };
+        Self { sideways, pressure, weight: scene.material.density() * (-scene.gravity[2]).max(0.0) }
     }
 
     /// Stress at the height `z` of the column at (x, y), Pa, tension positive, in the order XX YY ZZ XY YZ XZ. The
     /// vertical stress carries all that lies straight above, of whatever body; `sideways` times that acts along x and
     /// y, which are the radial and the hoop direction in the axisymmetric space.
     pub fn at(&self, lattices: &[Lattice], [x, y]: [f64; 2], z: f64) -> [f64; 6] {
-        let Some(sideways) = self.sideways else { return [0.0; 6] };
+        let Some(sideways) = self.sideways else {
+            let p = -self.pressure + 0.0;
+            return [p, p, p, 0.0, 0.0, 0.0];
+        };
         let above = |(bottom, top): (f64, f64)| (top - bottom.max(z)).max(0.0);
         // Disorder may lift a particle of the top layer above the surface: nothing weighs on it.
         let depth: f64 = lattices.iter().filter_map(|lattice| lattice.vertical_extent(x, y)).map(above).sum();

@@ -109,7 +109,14 @@ mod tests {
 
     fn block(space: Space, spacing: f64) -> Scene {
         let mut scene = scene(space, spacing, Shape::Box { min: [0.0; 3], max: [0.1; 3] });
-        scene.walls.push(Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip });
+        scene.walls.push(Wall {
+            axis: 2,
+            at: 0.0,
+            side: 1.0,
+            slip: Slip::NoSlip,
+            kind: formats::scene::WallKind::Virtual,
+            velocity: [0.0; 3],
+        });
         scene
     }
 

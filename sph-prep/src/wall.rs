@@ -43,11 +43,11 @@ pub fn within_reach(scene: &Scene, lattices: &[Lattice]) -> u64 {
 mod tests {
     use super::*;
     use crate::{fill, testing::scene};
-    use formats::scene::{Slip, Wall, WallLattice};
+    use formats::scene::{Slip, Wall, WallKind, WallLattice};
     use std::collections::HashSet;
 
     fn floor() -> Wall {
-        Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip }
+        Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip, kind: WallKind::Virtual, velocity: [0.0; 3] }
     }
 
     /// The sites near the particles, one by one.

@@ -16,6 +16,7 @@ pub trait Job {
 pub fn resolve<J: Job>(scene: &Scene, job: J) -> J::Output {
     match &scene.material {
         Law::DruckerPrager(law) => with_material(scene, DruckerPrager::new(law), job),
+        Law::MuI(_) | Law::ViscoPlastic(_) => todo!(),
     }
 }
 

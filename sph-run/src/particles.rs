@@ -50,13 +50,24 @@ pub struct Particles<const D: usize, const N: usize> {
     pub density: Vec<f64>,
     /// What the material remembers.
     pub history: Vec<History>,
+    /// Work of the stress and heat of the viscosity between particles, J/kg.
+    pub work: Vec<Work>,
     /// Index of the scene's body.
     pub body: Vec<u64>,
 }
 
+/// Energy that left the motion of a particle, J/kg.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Work {
+    /// Work the stress has done on the strain: stored or dissipated by the material.
+    pub stress: f64,
+    /// Heat of the viscosity between particles.
+    pub viscous: f64,
+}
+
 /// u64 words that carry one particle between ranks, for D coordinates and N stress components.
 pub const fn packed_len(d: usize, n: usize) -> usize {
-    3 * d + n + 5
+    3 * d + n + 7
 }
 
 impl<const D: usize, const N: usize> Particles<D, N> {
@@ -72,6 +83,7 @@ impl<const D: usize, const N: usize> Particles<D, N> {
             particles.mass.push(rows.mass[i]);
             particles.density.push(rows.density[i]);
             particles.history.push(History { plastic_strain: rows.plastic_strain[i] });
+            particles.work.push(Work { stress: rows.stress_work[i], viscous: rows.viscous_work[i] });
             particles.body.push(rows.body[i]);
         }
         particles.volume = vec![0.0; rows.len()];
@@ -92,6 +104,8 @@ impl<const D: usize, const N: usize> Particles<D, N> {
             mass: self.mass.clone(),
             density: self.density.clone(),
             stress: self.stress[owned].iter().map(|&s| S::stress_to_disk(s)).collect(),
+            stress_work: self.work.iter().map(|w| w.stress).collect(),
+            viscous_work: self.work.iter().map(|w| w.viscous).collect(),
             plastic_strain: self.history.iter().map(|h| h.plastic_strain).collect(),
         }
     }
@@ -125,7 +139,9 @@ impl<const D: usize, const N: usize> Particles<D, N> {
     pub fn pack(&self, i: usize, message: &mut Vec<u64>) {
         let bits = |f: &f64| f.to_bits();
         message.extend([self.key[i], self.body[i]]);
-        message.extend([self.mass[i], self.density[i], self.history[i].plastic_strain].iter().map(bits));
+        let Work { stress, viscous } = self.work[i];
+        message
+            .extend([self.mass[i], self.density[i], self.history[i].plastic_strain, stress, viscous].iter().map(bits));
         message.extend(self.x[i].0.iter().chain(&self.v[i].0).chain(&self.a[i].0).map(bits));
         message.extend(self.stress[i].0.iter().map(bits));
     }
@@ -141,10 +157,11 @@ impl<const D: usize, const N: usize> Particles<D, N> {
             self.mass.push(real(2));
             self.density.push(real(3));
             self.history.push(History { plastic_strain: real(4) });
-            self.x.push(vector(5));
-            self.v.push(vector(5 + D));
-            self.a.push(vector(5 + 2 * D));
-            self.stress.push(Sym(std::array::from_fn(|a| real(5 + 3 * D + a))));
+            self.work.push(Work { stress: real(5), viscous: real(6) });
+            self.x.push(vector(7));
+            self.v.push(vector(7 + D));
+            self.a.push(vector(7 + 2 * D));
+            self.stress.push(Sym(std::array::from_fn(|a| real(7 + 3 * D + a))));
             self.volume.push(0.0);
         }
         self.own(self.key.len());
@@ -164,6 +181,7 @@ impl<const D: usize, const N: usize> Particles<D, N> {
         pick(&mut self.mass, order);
         pick(&mut self.density, order);
         pick(&mut self.history, order);
+        pick(&mut self.work, order);
         pick(&mut self.body, order);
         self.own(order.len());
     }

@@ -245,8 +245,12 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         let header = self.simulation.header(self.job.scene, &self.job.scene_hash);
         let mut rows = self.simulation.rows();
         let reals = [&mut rows.position, &mut rows.velocity, &mut rows.acceleration].into_iter().flatten().flatten();
-        for real in
-            reals.chain(rows.stress.iter_mut().flatten()).chain(&mut rows.density).chain(&mut rows.plastic_strain)
+        for real in reals
+            .chain(rows.stress.iter_mut().flatten())
+            .chain(&mut rows.density)
+            .chain(&mut rows.plastic_strain)
+            .chain(&mut rows.stress_work)
+            .chain(&mut rows.viscous_work)
         {
             if !real.is_finite() {
                 *real = f64::MAX;

@@ -17,6 +17,7 @@ fn the_density_gate_gives_volume_back() {
         cohesion: 0.0,
         cone: Cone::Compression,
         rotation: Rotation::Jaumann,
+        mean_stress: formats::scene::MeanStress::Rate,
     });
     let cycle = |gate: f64| {
         let (mut stress, mut density, mut history) = (Sym::<6>::default(), 2600.0, History::default());

@@ -36,7 +36,7 @@ fn growth<const D: usize, const N: usize, P: Physics<D, N, Material = DruckerPra
         P::Space::KIND.name()
     );
     let scene = Scene::read("block.toml", &text).expect("a sound scene");
-    let Law::DruckerPrager(law) = &scene.material;
+    let Law::DruckerPrager(law) = &scene.material else { unreachable!() };
     let particles = Particles::from_rows::<P::Space>(&block::<D, N, P::Space>(side));
     let (count, material) = (particles.owned as u64, DruckerPrager::new(law));
     let mut run = Simulation::<D, N, P>::new(comm, &scene, material, particles, count, Clock::default());
@@ -73,6 +73,8 @@ fn block<const D: usize, const N: usize, S: Space<D, N>>(side: usize) -> Rows {
     rows.mass = rows.position.iter().map(mass).collect();
     rows.density = vec![DENSITY; count];
     rows.stress = vec![[0.0; 6]; count];
+    rows.stress_work = vec![0.0; count];
+    rows.viscous_work = vec![0.0; count];
     rows.plastic_strain = vec![0.0; count];
     rows
 }

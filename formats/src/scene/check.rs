@@ -2,20 +2,13 @@
 //! What concerns places (bodies, walls, planes of symmetry) is in [`super::geometry`].
 
 use super::{
-    Cone, DruckerPrager, End, Initial, InitialStress, Material, Numerics, Output, Rotation, Scene, SceneError,
-    geometry,
-    raw::{Allowed, Faults, Found, NOT_NEGATIVE, POSITIVE, Table, values},
+    End, Initial, InitialStress, Lattice, Material, Output, Scene, SceneError, geometry, material, numerics,
+    raw::{Allowed, Faults, NOT_NEGATIVE, POSITIVE, Table, values},
 };
 use crate::{kernel::Kernel, space::Space, units::Dimension};
 use toml::de::DeTable;
 
-const POISSON: Allowed = Allowed { says: "in [0, 0.5)", holds: |v| (0.0..0.5).contains(&v) };
-const FRICTION: Allowed = Allowed { says: "in [0, 90) degrees", holds: |v| (0.0..90.0).contains(&v) };
 const H_OVER_DX: Allowed = Allowed { says: "in [1, 3]", holds: |v| (1.0..=3.0).contains(&v) };
-const COURANT: Allowed = Allowed { says: "in (0, 1.7]", holds: |v| v > 0.0 && v <= 1.7 };
-const VISCOSITY: Allowed = Allowed { says: "in [0, 1]", holds: |v| (0.0..=1.0).contains(&v) };
-const DENSITY_GATE: Allowed =
-    Allowed { says: "in [0, 1), a fraction of the initial density", holds: |v| (0.0..1.0).contains(&v) };
 const JITTER: Allowed = Allowed { says: "in [0, 0.5), a fraction of the spacing", holds: |v| (0.0..0.5).contains(&v) };
 const AT_REST: Allowed =
     Allowed { says: "in (0, 1), a fraction of the peak kinetic energy", holds: |v| v > 0.0 && v < 1.0 };
@@ -29,6 +22,7 @@ pub(super) struct Setting {
     pub spacing: Option<f64>,
     pub gravity: Option<[f64; 3]>,
     pub symmetry: [bool; 2],
+    pub periodic: [Option<[f64; 2]>; 3],
 }
 
 /// Checks the text of a scene file. All faults are reported at once, in the order of the file.
@@ -50,13 +44,15 @@ pub(super) fn scene(name: &str, text: &str) -> Result<Scene, SceneError> {
 
 /// Reads every section before it gives up on any, so that no fault hides another.
 fn read(root: Table<'_>) -> Option<Scene> {
-    let setting = setting(&root);
-    let title = title(&root);
     let (kernel, h_over_dx) = kernel(&root);
-    let material = material(&root);
+    let setting = setting(&root, h_over_dx);
+    let title = title(&root);
+    let material = material::read(&root);
     let (bodies, walls) = geometry::read(&root, &setting);
     let initial = initial(&root, &setting, material.as_ref());
-    let numerics = numerics(&root, setting.space, kernel, h_over_dx);
+    let place =
+        numerics::Place { space: setting.space, kernel, h_over_dx, held: geometry::held(&bodies, &walls, &setting) };
+    let numerics = numerics::read(&root, place, material.as_ref());
     let end = end(&root);
     let output = output(&root, end.as_ref());
     root.finish();
@@ -69,23 +65,70 @@ fn read(root: Table<'_>) -> Option<Scene> {
         spacing: setting.spacing?,
         gravity: setting.gravity?,
         symmetry: setting.symmetry,
+        periodic: setting.periodic,
         kernel,
         h_over_dx,
         material: material?,
         bodies,
         walls: walls?,
         initial: initial?,
-        numerics,
+        numerics: numerics?,
         end: end?,
         output: output?,
     })
 }
 
-fn setting(root: &Table<'_>) -> Setting {
+fn setting(root: &Table<'_>, h_over_dx: f64) -> Setting {
     let space = root.needed_choice("space", &Space::ALL.map(|space| (space.name(), space))).map(|found| found.value);
     let spacing = root.needed("spacing", Dimension::Length, &POSITIVE).map(|found| found.value);
     let gravity = gravity(root, space);
-    Setting { space, spacing, gravity, symmetry: symmetry(root, space, gravity) }
+    let symmetry = symmetry(root, space, gravity);
+    let periodic = periodic(root, space, spacing, symmetry, h_over_dx);
+    Setting { space, spacing, gravity, symmetry, periodic }
+}
+
+/// Support of the kernel with the skin of the neighbour lists, in smoothing lengths: a particle and its copy one period
+/// away must never both be in reach of a third.
+const REACH: f64 = 2.2;
+
+fn periodic(
+    root: &Table<'_>,
+    space: Option<Space>,
+    spacing: Option<f64>,
+    symmetry: [bool; 2],
+    h_over_dx: f64,
+) -> [Option<[f64; 2]>; 3] {
+    let table = root.child("periodic");
+    let mut periods = [None; 3];
+    for (axis, key) in ["x", "y"].into_iter().enumerate() {
+        let ends = table.child(key);
+        if !ends.is_there() {
+            continue;
+        }
+        let from = ends.needed("from", Dimension::Length, &super::raw::ANY);
+        let to = ends.needed("to", Dimension::Length, &super::raw::ANY);
+        let fault = |message: String| ends.faults.add(ends.offset, &ends.path, message);
+        match space {
+            Some(Space::Axisymmetric) => fault("the space \"axisymmetric\" has no periodic axis".into()),
+            Some(Space::PlaneStrain) if axis == 1 => fault("the space \"plane-strain\" has no y axis".into()),
+            _ if symmetry[axis] => fault(format!("{key} = 0 is a plane of symmetry; drop that, or this")),
+            _ => {}
+        }
+        if let (Some(from), Some(to), Some(dx)) = (&from, &to, spacing) {
+            let cells = (to.value - from.value) / dx;
+            let least = 2.0 * REACH * h_over_dx;
+            if cells <= least {
+                ends.faults.at(to, format!("the period is {cells} spacings; it must be more than {least:.2}"));
+            } else if (cells - cells.round()).abs() > 1e-6 {
+                ends.faults.at(to, format!("the period must be a whole number of spacings; it is {cells} of {dx} m"));
+            } else {
+                periods[axis] = Some([from.value, to.value]);
+            }
+        }
+        ends.finish();
+    }
+    table.finish();
+    periods
 }
 
 fn title(root: &Table<'_>) -> Option<String> {
@@ -165,68 +208,46 @@ fn kernel(root: &Table<'_>) -> (Kernel, f64) {
     (kind, ratio.map_or(kind.default_h_over_dx(), |found| found.value))
 }
 
-fn material(root: &Table<'_>) -> Option<Material> {
-    let table = root.needed_child("material");
-    let law = drucker_prager(table.needed_child("drucker-prager"));
-    table.finish();
-    law.map(Material::DruckerPrager)
-}
-
-fn drucker_prager(table: Table<'_>) -> Option<DruckerPrager> {
-    let density = table.needed("density", Dimension::Density, &POSITIVE);
-    let young = table.needed("young", Dimension::Stress, &POSITIVE);
-    let poisson = table.needed("poisson", Dimension::Number, &POISSON);
-    let friction = table.needed("friction", Dimension::Angle, &FRICTION);
-    let dilation = table.number("dilation", Dimension::Angle, &NOT_NEGATIVE);
-    let cohesion = table.needed("cohesion", Dimension::Stress, &NOT_NEGATIVE);
-    let cones = [
-        ("compression", Cone::Compression),
-        ("extension", Cone::Extension),
-        ("plane-strain", Cone::PlaneStrain),
-        ("plane-strain-isochoric", Cone::PlaneStrainIsochoric),
-    ];
-    let cone = table.choice("cone", &cones);
-    let rotations = [("jaumann", Rotation::Jaumann), ("hughes-winget", Rotation::HughesWinget)];
-    let rotation = table.choice("rotation", &rotations);
-    if let (Some(dilation), Some(friction)) = (&dilation, &friction)
-        && dilation.value > friction.value
-    {
-        let (source, friction) = (table.faults.source(dilation), friction.value);
-        let message =
-            format!("{source} is out of range; it must be in [0, {friction}] degrees, up to the friction angle");
-        table.faults.at(dilation, message);
-    }
-    table.finish();
-    Some(DruckerPrager {
-        density: density?.value,
-        young: young?.value,
-        poisson: poisson?.value,
-        friction_deg: friction?.value,
-        dilation_deg: dilation.map_or(0.0, |found| found.value),
-        cohesion: cohesion?.value,
-        cone: cone.map_or(Cone::Compression, |found| found.value),
-        rotation: rotation.map_or(Rotation::Jaumann, |found| found.value),
-    })
-}
-
 fn initial(root: &Table<'_>, setting: &Setting, material: Option<&Material>) -> Option<Initial> {
     #[derive(Clone, Copy, PartialEq)]
     enum Kind {
         Zero,
+        Pressure,
         Hydrostatic,
         K0,
     }
     let table = root.child("initial");
-    let kinds = [("zero", Kind::Zero), ("hydrostatic", Kind::Hydrostatic), ("k0", Kind::K0)];
+    let kinds =
+        [("zero", Kind::Zero), ("pressure", Kind::Pressure), ("hydrostatic", Kind::Hydrostatic), ("k0", Kind::K0)];
     let kind = table.choice("stress", &kinds);
+    let pressure = table.number("pressure", Dimension::Stress, &NOT_NEGATIVE);
+    let lattices =
+        [("cubic", Lattice::Cubic), ("hexagonal", Lattice::Hexagonal), ("body-centred", Lattice::BodyCentred)];
+    let lattice = table.choice("lattice", &lattices);
+    if let (Some(lattice), Some(Space::PlaneStrain | Space::Axisymmetric)) = (&lattice, setting.space)
+        && lattice.value == Lattice::BodyCentred
+    {
+        table.faults.at(lattice, "\"body-centred\" needs three dimensions; in a plane use \"hexagonal\"");
+    }
     let k0 = table.number("k0", Dimension::Number, &NOT_NEGATIVE);
     let jitter = table.number("jitter", Dimension::Number, &JITTER);
     let seed = table.count("seed");
     if let (Some(k0), true) = (&k0, kind.as_ref().map_or(!table.has("stress"), |kind| kind.value != Kind::K0)) {
         table.faults.at(k0, "is used only with stress = \"k0\"; set that, or drop this key");
     }
+    let wants_pressure = kind.as_ref().is_some_and(|kind| kind.value == Kind::Pressure);
+    match (&pressure, wants_pressure) {
+        (Some(pressure), false) if kind.is_some() || !table.has("stress") => {
+            table.faults.at(pressure, "is used only with stress = \"pressure\"; set that, or drop this key");
+        }
+        (None, true) if !table.has("pressure") => {
+            let message = "missing; a stress such as \"600 Pa\" is needed with stress = \"pressure\"";
+            table.faults.structure(table.offset, &table.path_of("pressure"), message);
+        }
+        _ => {}
+    }
     if let (Some(kind), Some(gravity)) = (&kind, setting.gravity)
-        && kind.value != Kind::Zero
+        && matches!(kind.value, Kind::Hydrostatic | Kind::K0)
         && gravity[2] >= 0.0
     {
         let message = "needs gravity along -z: there is no weight to carry; use \"zero\", or give gravity";
@@ -236,51 +257,19 @@ fn initial(root: &Table<'_>, setting: &Setting, material: Option<&Material>) -> 
     let stress = match kind.map_or(Kind::Zero, |found| found.value) {
         Kind::Zero => InitialStress::Zero,
         Kind::Hydrostatic => InitialStress::Hydrostatic,
+        Kind::Pressure => InitialStress::Pressure(pressure?.value),
         Kind::K0 => {
-            let Material::DruckerPrager(law) = material?;
-            let elastic = law.poisson / (1.0 - law.poisson);
+            // A fluid has no sideways stress of its own: only the pressure.
+            let elastic = match material? {
+                Material::DruckerPrager(law) => law.poisson / (1.0 - law.poisson),
+                Material::MuI(_) | Material::ViscoPlastic(_) => 1.0,
+            };
             InitialStress::K0 { coefficient: k0.map_or(elastic, |found| found.value) }
         }
     };
     let jitter = jitter.map_or(0.0, |found| found.value);
-    Some(Initial { stress, jitter, seed: seed.map_or(1, |found| found.value) })
-}
-
-fn numerics(root: &Table<'_>, space: Option<Space>, kernel: Kernel, h_over_dx: f64) -> Numerics {
-    let table = root.child("numerics");
-    let courant = table.number("courant", Dimension::Number, &COURANT);
-    let viscosity = table.number("viscosity", Dimension::Number, &VISCOSITY);
-    let damping = table.number("damping", Dimension::Rate, &NOT_NEGATIVE);
-    let density_gate = table.number("density-gate", Dimension::Number, &DENSITY_GATE);
-    let limit = if space == Some(Space::Axisymmetric) { ring_limit(kernel, h_over_dx) } else { f64::INFINITY };
-    // Up to 92 % of the limit is stable in tests; the default keeps 20 % away from it.
-    let most = (92.0 * limit).floor() / 100.0;
-    if let Some(found) = &courant
-        && found.value > most
-    {
-        let source = table.faults.source(found);
-        let reason = "the hoop stress of the innermost rings limits the time step in the axisymmetric space";
-        table.faults.at(found, format!("{source} is too large; it must be in (0, {most}] with this kernel: {reason}"));
-    }
-    table.finish();
-    let or = |found: Option<Found<f64>>, default| found.map_or(default, |found| found.value);
-    Numerics {
-        courant: or(courant, 0.6_f64.min(0.8 * limit)),
-        viscosity: or(viscosity, 0.1),
-        damping: or(damping, 0.0),
-        density_gate: or(density_gate, 0.0),
-    }
-}
-
-/// Largest stable dt c/h of leap-frog where rings lie at dx/2 from the axis: omega^2 = (2 c/(L h))^2 + (2 c/dx)^2, with
-/// L the limit without rings, measured on free blocks. Measured with rings: 0.75 to 0.80 for the cubic spline at
-/// h = 1.2 dx, 0.60 to 0.65 for Wendland at 1.5625, 0.45 to 0.50 at 2.
-fn ring_limit(kernel: Kernel, h_over_dx: f64) -> f64 {
-    let free = match kernel {
-        Kernel::CubicSpline => 1.86,
-        Kernel::WendlandC2 => 1.76,
-    };
-    free / (1.0 + (free * h_over_dx).powi(2)).sqrt()
+    let lattice = lattice.map_or(Lattice::Cubic, |found| found.value);
+    Some(Initial { stress, lattice, jitter, seed: seed.map_or(1, |found| found.value) })
 }
 
 fn end(root: &Table<'_>) -> Option<End> {

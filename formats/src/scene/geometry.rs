@@ -2,7 +2,7 @@
 //! and each other.
 
 use super::{
-    Body, Shape, Slip, Wall,
+    Body, Shape, Slip, Wall, WallKind,
     check::{AXES, Setting},
     raw::{Faults, Found, POSITIVE, Table, values},
 };
@@ -31,6 +31,8 @@ struct PlacedWall {
     at: Found<f64>,
     side: Found<f64>,
     slip: Found<Slip>,
+    kind: WallKind,
+    velocity: [f64; 3],
 }
 
 /// All bodies and all walls; None where one has a fault.
@@ -54,8 +56,9 @@ pub(super) fn read(root: &Table<'_>, setting: &Setting) -> (Option<Vec<Body>>, O
         fit.bodies(&known_bodies, &right_walls);
     }
     let walls = walls.iter().map(|wall| {
-        let PlacedWall { axis, at, side, slip, .. } = wall.as_ref()?;
-        Some(Wall { axis: axis.value, at: at.value, side: side.value, slip: slip.value })
+        let PlacedWall { axis, at, side, slip, kind, velocity, .. } = wall.as_ref()?;
+        let (kind, velocity) = (*kind, *velocity);
+        Some(Wall { axis: axis.value, at: at.value, side: side.value, slip: slip.value, kind, velocity })
     });
     let walls = walls.collect();
     (bodies.into_iter().map(|placed| placed.map(|placed| placed.body)).collect(), walls)
@@ -191,9 +194,57 @@ fn wall(name: String, table: Table<'_>, setting: &Setting) -> Option<PlacedWall>
         table.faults.at(axis, message);
         right = false;
     }
+    let kind = table.choice("kind", &[("virtual", WallKind::Virtual), ("mirror", WallKind::Mirror)]);
+    let velocity = table.vector("velocity", Dimension::Velocity);
+    if let (Some(velocity), Some(axis)) = (&velocity, &axis) {
+        let still = |a: usize| match setting.space {
+            Some(Space::Axisymmetric) => a != 2,
+            Some(Space::PlaneStrain) => a == 1,
+            _ => false,
+        };
+        for a in (0..3).filter(|&a| (a == axis.value || still(a)) && velocity[a].value != 0.0) {
+            faults_of_motion(&table, &velocity[a], a, axis.value);
+            right = false;
+        }
+        if slip.as_ref().is_some_and(|slip| slip.value == Slip::FreeSlip) && velocity.iter().any(|v| v.value != 0.0) {
+            table
+                .faults
+                .at(&velocity[0], "a free-slip wall moves nothing; set slip = \"no-slip\", or drop the velocity");
+            right = false;
+        }
+    }
     table.finish();
-    let wall = PlacedWall { name, axis: axis?, at: at?, side: side?, slip: slip? };
+    let velocity = velocity.as_ref().map_or([0.0; 3], values);
+    let kind = kind.map_or(WallKind::Virtual, |found| found.value);
+    let wall = PlacedWall { name, axis: axis?, at: at?, side: side?, slip: slip?, kind, velocity };
     right.then_some(wall)
+}
+
+fn faults_of_motion(table: &Table<'_>, component: &Found<f64>, along: usize, normal: usize) {
+    let name = AXES[along];
+    let message = match along == normal {
+        true => format!("a wall normal to {name} slides along itself: its velocity along {name} must be 0"),
+        false => format!("the velocity of this wall along {name} must be 0 in this space"),
+    };
+    table.faults.at(component, message);
+}
+
+/// Is the material held on every side: by a wall, a plane of symmetry, the axis, or a period, at most a spacing away?
+pub(super) fn held(bodies: &Option<Vec<Body>>, walls: &Option<Vec<Wall>>, setting: &Setting) -> bool {
+    let (Some(bodies), Some(walls), Some(space), Some(dx)) = (bodies, walls, setting.space, setting.spacing) else {
+        // Other faults come first.
+        return true;
+    };
+    space.axes().iter().filter(|&&axis| axis != 2).all(|&axis| {
+        let low = bodies.iter().map(|body| bounds(&body.shape, space).0[axis]).fold(f64::INFINITY, f64::min);
+        let high = bodies.iter().map(|body| bounds(&body.shape, space).1[axis]).fold(f64::NEG_INFINITY, f64::max);
+        let wall = |side: f64, end: f64| {
+            walls.iter().any(|wall| wall.axis == axis && wall.side == side && side * (end - wall.at) <= dx)
+        };
+        let mirrored = (axis == 0 && space == Space::Axisymmetric) || (axis < 2 && setting.symmetry[axis]);
+        let period = setting.periodic[axis].is_some();
+        period || ((wall(1.0, low) || (mirrored && low <= dx)) && wall(-1.0, high))
+    })
 }
 
 /// What bodies and walls must fit.

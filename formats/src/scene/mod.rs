@@ -6,6 +6,9 @@ mod check;
 mod error;
 mod front;
 mod geometry;
+mod law;
+mod material;
+mod numerics;
 mod raw;
 mod walls;
 
@@ -28,6 +31,8 @@ pub struct Scene {
     /// Is the plane x = 0, y = 0 a plane of symmetry? The material lies on the positive side.
     /// The axis of the axisymmetric space is implied: `[false; 2]` there.
     pub symmetry: [bool; 2],
+    /// Where the scene repeats itself along x, y, z, m: lower and upper end. What leaves at one comes in at the other.
+    pub periodic: [Option<[f64; 2]>; 3],
     /// Smoothing kernel.
     pub kernel: Kernel,
     /// Smoothing length over spacing, h/dx.
@@ -53,6 +58,10 @@ pub struct Scene {
 pub enum Material {
     /// Elastic, perfectly plastic with the Drucker-Prager criterion.
     DruckerPrager(DruckerPrager),
+    /// Granular fluid whose friction depends on the inertial number.
+    MuI(MuI),
+    /// Bingham fluid with a frictional yield stress.
+    ViscoPlastic(ViscoPlastic),
 }
 
 /// Parameters of the Drucker-Prager law.
@@ -74,6 +83,101 @@ pub struct DruckerPrager {
     pub cone: Cone,
     /// How the stress turns with the material.
     pub rotation: Rotation,
+    /// Where the mean stress comes from.
+    pub mean_stress: MeanStress,
+}
+
+/// Where the mean stress of the Drucker-Prager law comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeanStress {
+    /// `rate`: it is integrated with the other components (Yang et al. 2020, Eq 15).
+    Rate,
+    /// `density`: it follows from the density, so that volume gained in free flight is given back. Without dilation only.
+    Density,
+}
+
+/// Parameters of the mu(I) law (Jop, Forterre & Pouliquen 2006).
+#[derive(Clone, Debug, PartialEq)]
+pub struct MuI {
+    /// Bulk density without pressure, kg/m3.
+    pub density: f64,
+    /// Speed of sound c of the equation of state p = c^2 (rho - rho0), m/s.
+    pub sound_speed: f64,
+    /// Friction coefficient mu_s at rest.
+    pub friction_static: f64,
+    /// Friction coefficient mu_2 of fast flow, at least `friction_static`.
+    pub friction_dynamic: f64,
+    /// Inertial number I0 half-way between the two.
+    pub inertial_number: f64,
+    /// Diameter d of the grains, m.
+    pub grain_diameter: f64,
+    /// Density rho_s of the grains, kg/m3.
+    pub grain_density: f64,
+    /// Norm of the shear rate.
+    pub norm: Norm,
+    /// Shape of mu(I).
+    pub curve: Curve,
+    /// What happens where the material does not flow.
+    pub unyielded: Unyielded,
+    /// Does a fluid below its initial density pull (negative pressure), or does it carry nothing?
+    pub tension: bool,
+}
+
+/// Norm |gdot| of the shear rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Norm {
+    /// `jop`: sqrt(2 e:e) (Jop et al. 2006).
+    Jop,
+    /// `printed`: sqrt(e:e), as in Yang et al. 2020, Eqs 5-7: sqrt(2) times the friction that is asked for.
+    Printed,
+}
+
+/// Shape of mu(I).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Curve {
+    /// `jop`: mu_s + (mu_2 - mu_s)/(1 + I0/I).
+    Jop,
+    /// `partially-regularised`: well posed for all but very large I (Barker & Gray 2017).
+    PartiallyRegularised,
+}
+
+/// The material below yield.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unyielded {
+    /// `cap`: a fluid of finite viscosity; Pa s, or as large as the time step of sound allows.
+    Cap(Option<f64>),
+    /// `elastic`: a solid of this shear modulus, Pa (Dunatunga & Kamrin 2015).
+    Elastic(f64),
+}
+
+/// Parameters of the visco-plastic fluid (Szewc 2017).
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViscoPlastic {
+    /// Density without pressure, kg/m3.
+    pub density: f64,
+    /// Speed of sound c of Tait's equation of state with exponent 7, m/s.
+    pub sound_speed: f64,
+    /// Friction angle, degrees, in [0, 90).
+    pub friction_deg: f64,
+    /// Cohesion, Pa.
+    pub cohesion: f64,
+    /// Viscosity mu_inf of fast flow, Pa s.
+    pub viscosity: f64,
+    /// Largest viscosity mu_solid, Pa s.
+    pub viscosity_solid: f64,
+    /// How viscous stress acts between particles.
+    pub operator: ViscousOperator,
+}
+
+/// How viscous stress acts between particles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ViscousOperator {
+    /// `arithmetic`: along pairs, with the sum of both viscosities (Szewc 2017, Eq 9).
+    Arithmetic,
+    /// `harmonic`: the same with twice the harmonic mean (Cleary & Monaghan 1999).
+    Harmonic,
+    /// `tensor`: as the stress 2 mu e, with the part of the velocity gradient the others leave out.
+    Tensor,
 }
 
 /// Cones through different edges of the Mohr-Coulomb pyramid; the same angle means different strengths.
@@ -153,6 +257,19 @@ pub struct Wall {
     pub side: f64,
     /// What it does to sliding.
     pub slip: Slip,
+    /// What stands behind it.
+    pub kind: WallKind,
+    /// Its velocity along itself, m/s; 0 across.
+    pub velocity: [f64; 3],
+}
+
+/// What stands behind a wall.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WallKind {
+    /// `virtual`: particles on a lattice that extrapolate the material's state (Yang et al. 2020, Eqs 27-32).
+    Virtual,
+    /// `mirror`: images of the material (ghost particles, Szewc 2017).
+    Mirror,
 }
 
 /// Condition at a wall.
@@ -169,10 +286,23 @@ pub enum Slip {
 pub struct Initial {
     /// Stress.
     pub stress: InitialStress,
+    /// How particles are arranged.
+    pub lattice: Lattice,
     /// Largest random displacement over spacing, in [0, 0.5).
     pub jitter: f64,
     /// Of the random displacement.
     pub seed: u64,
+}
+
+/// Arrangement of particles at the start; each has the volume dx^D.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lattice {
+    /// `cubic`: squares or cubes with the sides of the spacing.
+    Cubic,
+    /// `hexagonal`: triangles; in three dimensions hexagonal close packing.
+    Hexagonal,
+    /// `body-centred`: cubes with a particle in the middle. Three dimensions only.
+    BodyCentred,
 }
 
 /// Stress at the start.
@@ -180,6 +310,8 @@ pub struct Initial {
 pub enum InitialStress {
     /// `zero`: none.
     Zero,
+    /// `pressure`: the same pressure everywhere, Pa.
+    Pressure(f64),
     /// `hydrostatic`: the weight above in all directions.
     Hydrostatic,
     /// `k0`: the weight above vertically, `coefficient` times that sideways.
@@ -192,14 +324,30 @@ pub enum InitialStress {
 /// Numerical parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Numerics {
-    /// Safety factor of the time step: dt = courant h/(c + |v|).
+    /// Safety factor of the time step: dt = courant min(h/(c + |v|), sqrt(h/|a|)).
     pub courant: f64,
+    /// Safety factor of the time step of viscosity: dt = viscous_courant rho h^2/mu.
+    pub viscous_courant: f64,
     /// Artificial viscosity alpha.
     pub viscosity: f64,
+    /// Does it act on approaching pairs only?
+    pub viscosity_on_approach: bool,
+    /// Quadratic artificial viscosity beta, on approaching pairs.
+    pub quadratic_viscosity: f64,
     /// Linear damping of the velocity, 1/s: for columns that settle, not for flows.
     pub damping: f64,
     /// Density over the initial one below which the material has come apart and carries no stress; 0 switches it off.
     pub density_gate: f64,
+    /// Diffusion of density delta (delta-SPH); 0 switches it off.
+    pub density_diffusion: f64,
+    /// Diffusion of stress zeta; 0 switches it off.
+    pub stress_diffusion: f64,
+    /// Artificial stress epsilon against clumping in tension; 0 switches it off.
+    pub artificial_stress: f64,
+    /// Are gradients corrected by the conjugate pair of operators sigma_i L_i + sigma_j L_j?
+    pub gradient_correction: bool,
+    /// Shifting of particles inside the body; 0 switches it off.
+    pub shifting: f64,
 }
 
 /// When the run is over.
@@ -234,31 +382,5 @@ impl Scene {
     /// SHA-256 of the text, as stored in every file the scene leads to.
     pub fn hash(text: &str) -> String {
         crate::provenance::sha256(text.as_bytes())
-    }
-}
-
-impl Material {
-    /// Density at the start, kg/m3.
-    pub fn density(&self) -> f64 {
-        match self {
-            Self::DruckerPrager(law) => law.density,
-        }
-    }
-    /// Speed of compression waves, m/s (Yang et al. 2020, Eq 41).
-    pub fn sound_speed(&self) -> f64 {
-        match self {
-            Self::DruckerPrager(law) => ((law.bulk() + 4.0 / 3.0 * law.shear()) / law.density).sqrt(),
-        }
-    }
-}
-
-impl DruckerPrager {
-    /// Bulk modulus K, Pa.
-    pub fn bulk(&self) -> f64 {
-        self.young / (3.0 * (1.0 - 2.0 * self.poisson))
-    }
-    /// Shear modulus G, Pa.
-    pub fn shear(&self) -> f64 {
-        self.young / (2.0 * (1.0 + self.poisson))
     }
 }

@@ -26,7 +26,9 @@ impl WallLattice {
             // The axis of r-z is a plane of symmetry too: sites across it must be images of each other.
             let axis_of_rings = axis == 0 && scene.space == Space::Axisymmetric;
             let symmetric = axis_of_rings || (axis < 2 && scene.symmetry[axis]);
-            if let (false, Some(wall)) = (symmetric, scene.walls.iter().find(|w| w.axis == axis)) {
+            if let Some([from, _]) = scene.periodic[axis] {
+                origin[axis] = from;
+            } else if let (false, Some(wall)) = (symmetric, scene.walls.iter().find(|w| w.axis == axis)) {
                 origin[axis] = wall.at;
             }
         }

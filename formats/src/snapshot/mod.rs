@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Version of the layout; a newer one is refused.
-pub const FORMAT_VERSION: u64 = 1;
+pub const FORMAT_VERSION: u64 = 2;
 
 /// What a particle file says of itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,6 +64,8 @@ pub struct Rows {
     pub mass: Vec<f64>,
     pub density: Vec<f64>,
     pub stress: Vec<[f64; 6]>,
+    pub stress_work: Vec<f64>,
+    pub viscous_work: Vec<f64>,
     pub plastic_strain: Vec<f64>,
 }
 
@@ -185,6 +187,8 @@ impl Rows {
             n if n == schema::MASS.name => Column::Real(&self.mass),
             n if n == schema::DENSITY.name => Column::Real(&self.density),
             n if n == schema::STRESS.name => Column::Real(self.stress.as_flattened()),
+            n if n == schema::STRESS_WORK.name => Column::Real(&self.stress_work),
+            n if n == schema::VISCOUS_WORK.name => Column::Real(&self.viscous_work),
             n if n == schema::PLASTIC_STRAIN.name => Column::Real(&self.plastic_strain),
             other => unreachable!("field {other} has no column"),
         }
@@ -200,6 +204,8 @@ impl Rows {
             n if n == schema::MASS.name => ColumnMut::Scalar(&mut self.mass),
             n if n == schema::DENSITY.name => ColumnMut::Scalar(&mut self.density),
             n if n == schema::STRESS.name => ColumnMut::Symmetric(&mut self.stress),
+            n if n == schema::STRESS_WORK.name => ColumnMut::Scalar(&mut self.stress_work),
+            n if n == schema::VISCOUS_WORK.name => ColumnMut::Scalar(&mut self.viscous_work),
             n if n == schema::PLASTIC_STRAIN.name => ColumnMut::Scalar(&mut self.plastic_strain),
             other => unreachable!("field {other} has no column"),
         }

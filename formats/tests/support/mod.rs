@@ -80,6 +80,8 @@ pub fn rows(count: u64, rank: u64, size: u64) -> Rows {
         mass: scalar(10),
         density: scalar(11),
         stress: ids.iter().map(|&row| [0, 1, 2, 3, 4, 5].map(|k| number(row, 12 + k))).collect(),
+        stress_work: scalar(19),
+        viscous_work: scalar(20),
         plastic_strain: scalar(18),
         id: ids.clone(),
     }

@@ -175,6 +175,8 @@ pub fn block(scene: &Scene) -> Rows {
                 rows.mass.push(2600.0 * volume);
                 rows.density.push(2600.0);
                 rows.stress.push([0.0; 6]);
+                rows.stress_work.push(0.0);
+                rows.viscous_work.push(0.0);
                 rows.plastic_strain.push(0.0);
             }
         }

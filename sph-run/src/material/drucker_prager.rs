@@ -2,7 +2,7 @@
 
 use super::{History, Material, rotation};
 use crate::algebra::Sym;
-use formats::scene::{self, Cone, Rotation};
+use formats::scene::{self, Rotation};
 
 const THIRD: f64 = 1.0 / 3.0;
 
@@ -35,28 +35,12 @@ pub struct DruckerPrager {
     sound_speed: f64,
 }
 
-/// Constants (alpha, k) of the cone that stands for a Mohr-Coulomb material; k has the unit of `cohesion`.
-pub fn cone(kind: Cone, friction_deg: f64, cohesion: f64) -> (f64, f64) {
-    let phi = friction_deg.to_radians();
-    let (sin, cos, tan) = (phi.sin(), phi.cos(), phi.tan());
-    let corners = |denominator: f64| (2.0 * sin / denominator, 6.0 * cohesion * cos / denominator);
-    match kind {
-        Cone::Compression => corners(3f64.sqrt() * (3.0 - sin)),
-        Cone::Extension => corners(3f64.sqrt() * (3.0 + sin)),
-        Cone::PlaneStrain => {
-            let denominator = (9.0 + 12.0 * tan * tan).sqrt();
-            (tan / denominator, 3.0 * cohesion / denominator)
-        }
-        Cone::PlaneStrainIsochoric => (sin / 3.0, cohesion * cos),
-    }
-}
-
 impl DruckerPrager {
     /// The law of a checked scene.
     pub fn new(scene: &scene::DruckerPrager) -> Self {
         let (bulk, shear) = (scene.bulk(), scene.shear());
-        let (alpha, k) = cone(scene.cone, scene.friction_deg, scene.cohesion);
-        let (alpha_psi, _) = cone(scene.cone, scene.dilation_deg, 0.0);
+        let (alpha, k) = scene.cone.constants(scene.friction_deg, scene.cohesion);
+        let (alpha_psi, _) = scene.cone.constants(scene.dilation_deg, 0.0);
         Self {
             bulk,
             shear,
