@@ -128,6 +128,7 @@ fn law() -> DruckerPrager {
         cohesion: 0.0,
         cone: Cone::Compression,
         rotation: Rotation::Jaumann,
+        mean_stress: MeanStress::Rate,
     }
 }
 
