@@ -1,6 +1,6 @@
 //! Warnings: what a scene may hold, but is known to lead to poor results.
 
-use crate::{initial::Stress, shape::Lattice, summary::Body};
+use crate::{initial::Stress, lattice::Lattice, summary::Body};
 use formats::{
     kernel::Kernel,
     scene::{InitialStress, Material, Scene, Slip},

@@ -4,7 +4,7 @@
 //! rank's share of the columns and summing over the shares before, so that they don't depend on the number of ranks.
 //! Then each rank makes the particles whose numbers fall to it; it never holds others.
 
-use crate::{initial::Stress, shape::Lattice};
+use crate::{initial::Stress, lattice::Lattice};
 use formats::{
     scene::Scene,
     snapshot::{Rows, share},
@@ -59,8 +59,8 @@ impl Plan {
     pub fn particles(&self, scene: &Scene, ids: Range<u64>) -> Rows {
         let mut rows = empty(ids.start, (ids.end - ids.start) as usize);
         let stress = Stress::new(scene);
-        let jitter = Jitter::new(scene);
         for (body, lattice) in self.lattices.iter().enumerate() {
+            let jitter = Jitter::new(scene, lattice);
             for part in 0..self.shares {
                 let at = body * self.shares as usize + part as usize;
                 let mut next = self.first[at];
@@ -72,14 +72,14 @@ impl Plan {
                     next = numbers.end;
                     let wanted = numbers.start.max(ids.start)..numbers.end.min(ids.end);
                     for id in wanted {
-                        let position = jitter.displace(id, [column.x, column.y, lattice.z(id - numbers.start)]);
+                        let position = jitter.displace(id, [column.x, column.y, lattice.z(column, id - numbers.start)]);
                         let stress = stress.at(&self.lattices, [column.x, column.y], position[2]);
                         let density = scene.material.density_at(-(stress[0] + stress[1] + stress[2]) / 3.0);
                         rows.id.push(id);
                         rows.body.push(body as u64);
                         rows.position.push(position);
                         rows.velocity.push(scene.bodies[body].velocity);
-                        rows.mass.push(density * lattice.volume(column));
+                        rows.mass.push(density * lattice.volume(column.x));
                         rows.density.push(density);
                         rows.stress.push(stress);
                         rows.stress_work.push(0.0);
@@ -96,7 +96,7 @@ impl Plan {
     pub fn volume(&self, body: usize, rank: u64) -> f64 {
         let lattice = &self.lattices[body];
         let columns = share(lattice.columns(), rank, self.shares).map(|c| lattice.column(c));
-        columns.map(|c| c.cells as f64 * lattice.volume(c)).sum()
+        columns.map(|c| c.cells as f64 * lattice.volume(c.x)).sum()
     }
 }
 
@@ -130,23 +130,25 @@ fn empty(first: u64, capacity: usize) -> Rows {
 /// the seed and the particle's number alone.
 struct Jitter {
     axes: &'static [usize],
-    amplitude: f64,
+    amplitude: [f64; 3],
     key: u64,
 }
 
 impl Jitter {
-    fn new(scene: &Scene) -> Self {
-        let amplitude = scene.initial.jitter * scene.spacing;
+    fn new(scene: &Scene, lattice: &Lattice) -> Self {
+        // Planes closer than a spacing have their first particles closer to the faces: none may leave the body.
+        let most = |axis: usize| scene.spacing.min(2.0 * lattice.margin(axis));
+        let amplitude = [0, 1, 2].map(|axis| scene.initial.jitter * most(axis));
         Self { axes: scene.space.axes(), amplitude, key: splitmix64(scene.initial.seed) }
     }
 
     fn displace(&self, id: u64, mut x: [f64; 3]) -> [f64; 3] {
-        if self.amplitude > 0.0 {
+        if self.amplitude[0] > 0.0 {
             for &axis in self.axes {
                 let bits = splitmix64(self.key ^ (3 * id + axis as u64));
                 // The top 53 bits fill a mantissa: uniform in [0, 1).
                 let uniform = (bits >> 11) as f64 / (1u64 << 53) as f64;
-                x[axis] += self.amplitude * (2.0 * uniform - 1.0);
+                x[axis] += self.amplitude[axis] * (2.0 * uniform - 1.0);
             }
         }
         x
@@ -175,7 +177,7 @@ mod tests {
     use super::*;
     use crate::testing::scene;
     use formats::{
-        scene::{Body, Shape},
+        scene::{self, Body, Shape},
         space::Space,
     };
 
@@ -201,14 +203,21 @@ mod tests {
 
     #[test]
     fn any_number_of_ranks_makes_the_same_particles() {
-        let scene = two_bodies();
-        let (plan, one) = made_by(&scene, 1);
+        for lattice in [scene::Lattice::Cubic, scene::Lattice::Hexagonal, scene::Lattice::BodyCentred] {
+            let mut scene = two_bodies();
+            scene.initial.lattice = lattice;
+            same_on_any_number_of_ranks(&scene);
+        }
+    }
+
+    fn same_on_any_number_of_ranks(scene: &Scene) {
+        let (plan, one) = made_by(scene, 1);
         assert_eq!(one[0].len() as u64, plan.total());
         assert!(one[0].id.iter().enumerate().all(|(n, &id)| n as u64 == id), "dense and in order");
         assert_eq!(plan.body(0).end, plan.body(1).start);
         for size in [2, 3, 5, 64] {
             let mut all = Rows::default();
-            for (rank, rows) in made_by(&scene, size).1.into_iter().enumerate() {
+            for (rank, rows) in made_by(scene, size).1.into_iter().enumerate() {
                 assert_eq!(rows.first, share(plan.total(), rank as u64, size).start);
                 all.id.extend(rows.id);
                 all.body.extend(rows.body);

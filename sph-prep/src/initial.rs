@@ -1,6 +1,6 @@
 //! Stress of the particles at the start.
 
-use crate::shape::Lattice;
+use crate::lattice::Lattice;
 use formats::scene::{InitialStress, Scene};
 
 /// The rule for the stress at the start.
@@ -39,7 +39,7 @@ impl Stress {
         };
         let above = |(bottom, top): (f64, f64)| (top - bottom.max(z)).max(0.0);
         // Disorder may lift a particle of the top layer above the surface: nothing weighs on it.
-        let depth: f64 = lattices.iter().filter_map(|lattice| lattice.vertical_extent(x, y)).map(above).sum();
+        let depth: f64 = lattices.iter().filter_map(|lattice| lattice.solid.vertical_extent(x, y)).map(above).sum();
         let vertical = -self.weight * depth;
         [sideways * vertical, sideways * vertical, vertical, 0.0, 0.0, 0.0]
     }
@@ -54,7 +54,7 @@ impl Stress {
                 if column.cells == 0 {
                     continue;
                 }
-                let stress = self.at(lattices, [column.x, column.y], lattice.z(0));
+                let stress = self.at(lattices, [column.x, column.y], lattice.z(column, 0));
                 if stress[2] < largest[2] {
                     largest = stress;
                 }

@@ -8,8 +8,10 @@ pub mod cli;
 pub mod failure;
 pub mod fill;
 pub mod initial;
+pub mod lattice;
 pub mod memory;
 pub mod output;
+pub mod packing;
 pub mod shape;
 pub mod summary;
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! What a run needs of memory, and whether this machine can prepare it: a slip in the spacing is refused before
 //! anything is made. Only the preparation's own need is held against this machine; the run may go to a larger one.
 
-use crate::{failure::Failure, shape::Lattice, summary, wall};
+use crate::{failure::Failure, lattice::Lattice, summary, wall};
 use formats::{scene::Scene, space::Space};
 use mpi::{collective::SystemOperation, traits::*};
 

@@ -1,7 +1,10 @@
 //! What the user is told before anything is written.
 
-use crate::{memory::Load, shape::Lattice};
-use formats::{scene::Scene, space::Space};
+use crate::{lattice::Lattice, memory::Load};
+use formats::{
+    scene::{self, Scene},
+    space::Space,
+};
 
 /// Whole numbers of intervals may be off by so much.
 const ROUNDING: f64 = 1e-9;
@@ -31,7 +34,7 @@ pub fn bodies(scene: &Scene, lattices: &[Lattice], particles: &[u64], discrete: 
     let one = |n: usize| Body {
         name: scene.bodies[n].name.clone(),
         particles: particles[n],
-        ideal: lattices[n].ideal_volume(),
+        ideal: lattices[n].solid.ideal_volume(),
         discrete: discrete[n],
     };
     (0..lattices.len()).map(one).collect()
@@ -40,7 +43,7 @@ pub fn bodies(scene: &Scene, lattices: &[Lattice], particles: &[u64], discrete: 
 /// Bodies in numbers, where there are too many particles to count.
 pub fn estimated(scene: &Scene, lattices: &[Lattice]) -> Vec<Body> {
     let particles: Vec<_> = lattices.iter().map(Lattice::estimate).collect();
-    let volumes: Vec<_> = lattices.iter().map(Lattice::ideal_volume).collect();
+    let volumes: Vec<_> = lattices.iter().map(|lattice| lattice.solid.ideal_volume()).collect();
     bodies(scene, lattices, &particles, &volumes)
 }
 
@@ -58,7 +61,12 @@ pub fn head(scene: &Scene, bodies: &[Body]) -> String {
     };
     line("scene", scene.title.clone());
     line("space", format!("{}{part}", scene.space.name()));
-    line("lattice", format!("dx = {} m, h = {} m ({kernel})", short(scene.spacing), short(scene.h())));
+    let arrangement = match scene.initial.lattice {
+        scene::Lattice::Cubic => "cubic",
+        scene::Lattice::Hexagonal => "hexagonal",
+        scene::Lattice::BodyCentred => "body-centred",
+    };
+    line("lattice", format!("{arrangement}, dx = {} m, h = {} m ({kernel})", short(scene.spacing), short(scene.h())));
     let unit = if scene.space == Space::PlaneStrain { "m2" } else { "m3" };
     for body in bodies {
         let (ideal, discrete) = (short(body.ideal), short(body.discrete));

@@ -1,6 +1,6 @@
 //! How many virtual wall particles the run starts with.
 
-use crate::shape::Lattice;
+use crate::lattice::Lattice;
 use formats::{
     scene::{Scene, Shape},
     space::Space,
@@ -17,7 +17,7 @@ pub fn within_reach(scene: &Scene, lattices: &[Lattice]) -> u64 {
     let border = [scene.symmetry[0] || axis, scene.symmetry[1], false];
     let mut sites = 0.0;
     for (lattice, body) in lattices.iter().zip(&scene.bodies) {
-        let (low, high) = lattice.bounds();
+        let (low, high) = lattice.solid.bounds();
         for wall in &scene.walls {
             let gap = if wall.side > 0.0 { low[wall.axis] - wall.at } else { wall.at - high[wall.axis] };
             // Every cell counts: the nearest particles are half a spacing inside the body.
