@@ -199,7 +199,7 @@ fn the_least_scene_gets_all_defaults() {
             kind: WallKind::Virtual,
             velocity: [0.0; 3],
         }],
-        initial: Initial { stress: InitialStress::Zero, lattice: Lattice::Cubic, jitter: 0.0, seed: 1 },
+        initial: Initial { stress: InitialStress::Zero, lattice: Lattice::Cubic, jitter: 0.0, seed: 1, relax: 0 },
         numerics: Numerics { courant: 0.6, viscosity: 0.1, damping: 0.0, ..numerics() },
         end: End { time: 0.35, at_rest: None },
         output: Output { snapshots: 0.35 / 20.0, history: 0.35 / 400.0 },
@@ -245,12 +245,23 @@ fn every_key_is_read() {
             lattice: Lattice::Cubic,
             jitter: 0.1,
             seed: 7,
+            relax: 0,
         },
         numerics: Numerics { courant: 0.3, viscosity: 0.2, damping: 2.0, ..numerics() },
         end: End { time: 2.0, at_rest: Some(1e-4) },
         output: Output { snapshots: 0.02, history: 0.001 },
     };
     assert_eq!(Scene::read("scene.toml", EVERYTHING), Ok(expected));
+}
+
+#[test]
+fn passes_of_relaxation_are_read() {
+    let with = |passes: &str| format!("{COLUMN}[initial]\nrelax = {passes}\n");
+    for passes in [0, 20, 10_000] {
+        assert_eq!(Scene::read("scene.toml", &with(&passes.to_string())).unwrap().initial.relax, passes);
+    }
+    bad(&with("20"), "relax = 20", "relax = 10001", (23, 9), "initial.relax", "from 0 to 10000");
+    bad(&with("20"), "relax = 20", "relax = 0.5", (23, 9), "initial.relax", "`0.5` is not a whole number");
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //! rank's share of the columns and summing over the shares before, so that they don't depend on the number of ranks.
 //! Then each rank makes the particles whose numbers fall to it; it never holds others.
 
-use crate::{initial::Stress, lattice::Lattice};
+use crate::{initial::Stress, lattice::Lattice, relax};
 use formats::{
     scene::Scene,
     snapshot::{Rows, share},
@@ -60,7 +60,16 @@ impl Plan {
         let mut rows = empty(ids.start, (ids.end - ids.start) as usize);
         let stress = Stress::new(scene);
         for (body, lattice) in self.lattices.iter().enumerate() {
+            let numbers = self.body(body);
+            if numbers.end <= ids.start || numbers.start >= ids.end {
+                continue;
+            }
             let jitter = Jitter::new(scene, lattice);
+            let relaxed = (scene.initial.relax > 0).then(|| {
+                let mut all = displaced(lattice, &jitter, numbers.start);
+                relax::relax(scene, lattice, &mut all);
+                all
+            });
             for part in 0..self.shares {
                 let at = body * self.shares as usize + part as usize;
                 let mut next = self.first[at];
@@ -72,14 +81,21 @@ impl Plan {
                     next = numbers.end;
                     let wanted = numbers.start.max(ids.start)..numbers.end.min(ids.end);
                     for id in wanted {
-                        let position = jitter.displace(id, [column.x, column.y, lattice.z(column, id - numbers.start)]);
-                        let stress = stress.at(&self.lattices, [column.x, column.y], position[2]);
+                        let placed = [column.x, column.y, lattice.z(column, id - numbers.start)];
+                        let mut position = jitter.displace(id, placed);
+                        // What jitter does to rings leaves them their mass; relaxed, they have the same section again.
+                        let mut place = [column.x, column.y];
+                        if let Some(all) = &relaxed {
+                            position = all[(id - self.first[body * self.shares as usize]) as usize];
+                            place = [position[0], position[1]];
+                        }
+                        let stress = stress.at(&self.lattices, place, position[2]);
                         let density = scene.material.density_at(-(stress[0] + stress[1] + stress[2]) / 3.0);
                         rows.id.push(id);
                         rows.body.push(body as u64);
                         rows.position.push(position);
                         rows.velocity.push(scene.bodies[body].velocity);
-                        rows.mass.push(density * lattice.volume(column.x));
+                        rows.mass.push(density * lattice.volume(place[0]));
                         rows.density.push(density);
                         rows.stress.push(stress);
                         rows.stress_work.push(0.0);
@@ -98,6 +114,13 @@ impl Plan {
         let columns = share(lattice.columns(), rank, self.shares).map(|c| lattice.column(c));
         columns.map(|c| c.cells as f64 * lattice.volume(c.x)).sum()
     }
+}
+
+/// Places of all particles of a body, whose first has this number.
+fn displaced(lattice: &Lattice, jitter: &Jitter, first: u64) -> Vec<[f64; 3]> {
+    let columns = (0..lattice.columns()).map(|c| lattice.column(c));
+    let places = columns.flat_map(|c| (0..c.cells).map(move |cell| [c.x, c.y, lattice.z(c, cell)]));
+    places.zip(first..).map(|(x, id)| jitter.displace(id, x)).collect()
 }
 
 /// The lattices of all bodies.
@@ -206,6 +229,8 @@ mod tests {
         for lattice in [scene::Lattice::Cubic, scene::Lattice::Hexagonal, scene::Lattice::BodyCentred] {
             let mut scene = two_bodies();
             scene.initial.lattice = lattice;
+            same_on_any_number_of_ranks(&scene);
+            scene.initial.relax = 2;
             same_on_any_number_of_ranks(&scene);
         }
     }

@@ -82,9 +82,8 @@ impl Lattice {
         let (low, high) = solid.bounds();
         let fits = |axis: usize, pitch: f64| {
             let size = high[axis] - low[axis];
-            let period = scene.periodic[axis].is_some_and(|[from, to]| size > to - from - 1e-6 * scene.spacing);
             let count = |pitch: f64| (size / pitch).round().max(1.0) as u64;
-            if period { 2 * count(2.0 * pitch) } else { count(pitch) }
+            if filled_period(scene, &solid, axis).is_some() { 2 * count(2.0 * pitch) } else { count(pitch) }
         };
         let (mut origin, mut first, mut columns) = (low, [0; 2], [1; 2]);
         let layers = fits(2, packing.pitch[2]);
@@ -160,6 +159,16 @@ impl Lattice {
         self.origin[2] + (layer as f64 + 0.5) * self.packing.pitch[2]
     }
 
+    /// The period along an axis, where the body fills it: lower and upper end, m.
+    pub fn filled_period(&self, scene: &Scene, axis: usize) -> Option<[f64; 2]> {
+        filled_period(scene, &self.solid, axis)
+    }
+
+    /// Volume of a particle, m3; its section in the plane spaces, m2.
+    pub fn section(&self) -> f64 {
+        self.share
+    }
+
     /// How far a particle may be moved along an axis from its place before it leaves the body, m.
     pub fn margin(&self, axis: usize) -> f64 {
         self.packing.margin(axis) * self.packing.pitch[axis]
@@ -182,6 +191,11 @@ impl Lattice {
             Space::Axisymmetric => 2.0 * PI * x * self.share,
         }
     }
+}
+
+fn filled_period(scene: &Scene, solid: &Solid, axis: usize) -> Option<[f64; 2]> {
+    let (low, high) = solid.bounds();
+    scene.periodic[axis].filter(|[from, to]| high[axis] - low[axis] > to - from - 1e-6 * scene.spacing)
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ pub mod lattice;
 pub mod memory;
 pub mod output;
 pub mod packing;
+pub mod relax;
 pub mod shape;
 pub mod summary;
 #[cfg(test)]

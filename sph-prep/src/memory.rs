@@ -12,6 +12,10 @@ pub const BYTES_PER_PARTICLE: u64 = 1400;
 /// Memory the preparation needs for a particle, bytes: its row of 144 bytes, and what HDF5 and the exchange copy.
 pub const BYTES_TO_PREPARE: u64 = 400;
 
+/// Memory a rank needs to relax a particle of a body, bytes: its place, its move, its images and the cells. Each rank
+/// relaxes whole bodies.
+pub const BYTES_TO_RELAX: u64 = 200;
+
 /// Memory a rank needs whatever it computes, bytes: the program, MPI and HDF5. Measured.
 pub const BYTES_PER_RANK: u64 = 45_000_000;
 
@@ -22,13 +26,16 @@ pub struct Load {
     pub particles: u64,
     /// Virtual particles of walls within reach at the start.
     pub walls: u64,
+    /// Particles of the largest body, where bodies are relaxed; else 0.
+    pub relaxed: u64,
 }
 
 impl Load {
     /// Estimates a scene from the volumes of its bodies.
     pub fn of(scene: &Scene, lattices: &[Lattice]) -> Self {
-        let particles = lattices.iter().map(Lattice::estimate).sum();
-        Self { particles, walls: wall::within_reach(scene, lattices) }
+        let estimates: Vec<u64> = lattices.iter().map(Lattice::estimate).collect();
+        let relaxed = if scene.initial.relax > 0 { estimates.iter().copied().max().unwrap_or(0) } else { 0 };
+        Self { particles: estimates.iter().sum(), walls: wall::within_reach(scene, lattices), relaxed }
     }
 
     /// Bytes `sph-run` is expected to need on that many ranks, all together.
@@ -38,7 +45,7 @@ impl Load {
 
     /// Bytes the preparation needs on that many ranks, all together.
     fn preparing(self, ranks: u64) -> u64 {
-        self.particles * BYTES_TO_PREPARE + ranks * BYTES_PER_RANK
+        self.particles * BYTES_TO_PREPARE + ranks * (self.relaxed * BYTES_TO_RELAX + BYTES_PER_RANK)
     }
 }
 
@@ -80,7 +87,7 @@ pub fn check(scene: &Scene, load: Load, room: f64, ranks: u64) -> Result<(), Fai
 /// themselves need more.
 fn fitting(scene: &Scene, load: Load, available: f64, ranks: u64) -> Option<f64> {
     let left = available - (ranks * BYTES_PER_RANK) as f64;
-    let particles = (load.particles * BYTES_TO_PREPARE) as f64;
+    let particles = (load.preparing(ranks) - ranks * BYTES_PER_RANK) as f64;
     let dimension = if scene.space == Space::ThreeD { 3.0 } else { 2.0 };
     if left <= 0.0 {
         return None;
@@ -148,6 +155,19 @@ mod tests {
             assert!(load(&coarser).preparing(3) as f64 > 0.7 * 3.0 * room, "no coarser than needed: {spacing}");
             assert!(check(&scene, load(&scene), f64::INFINITY, 3).is_ok());
         }
+    }
+
+    #[test]
+    fn each_rank_relaxes_whole_bodies() {
+        let mut scene = block(Space::ThreeD, 0.01);
+        let (plain, room) = (load(&scene).preparing(3), 60e6);
+        assert!(check(&scene, load(&scene), room, 3).is_ok());
+        scene.initial.relax = 1;
+        assert_eq!(load(&scene).preparing(3) - plain, 3 * 1000 * BYTES_TO_RELAX);
+        scene.spacing = 0.001;
+        let spacing = fitting(&scene, load(&scene), 3.0 * room, 3).unwrap();
+        scene.initial.relax = 0;
+        assert!(fitting(&scene, load(&scene), 3.0 * room, 3).unwrap() < spacing, "more memory, coarser");
     }
 
     #[test]

@@ -208,6 +208,9 @@ fn kernel(root: &Table<'_>) -> (Kernel, f64) {
     (kind, ratio.map_or(kind.default_h_over_dx(), |found| found.value))
 }
 
+/// Largest number of passes of relaxation.
+const MOST_PASSES: u64 = 10_000;
+
 fn initial(root: &Table<'_>, setting: &Setting, material: Option<&Material>) -> Option<Initial> {
     #[derive(Clone, Copy, PartialEq)]
     enum Kind {
@@ -232,6 +235,11 @@ fn initial(root: &Table<'_>, setting: &Setting, material: Option<&Material>) -> 
     let k0 = table.number("k0", Dimension::Number, &NOT_NEGATIVE);
     let jitter = table.number("jitter", Dimension::Number, &JITTER);
     let seed = table.count("seed");
+    let relax = table.count("relax");
+    if let Some(relax) = relax.as_ref().filter(|relax| relax.value > MOST_PASSES) {
+        let source = table.faults.source(relax);
+        table.faults.at(relax, format!("{source} is out of range; it must be from 0 to {MOST_PASSES}"));
+    }
     if let (Some(k0), true) = (&k0, kind.as_ref().map_or(!table.has("stress"), |kind| kind.value != Kind::K0)) {
         table.faults.at(k0, "is used only with stress = \"k0\"; set that, or drop this key");
     }
@@ -269,7 +277,8 @@ fn initial(root: &Table<'_>, setting: &Setting, material: Option<&Material>) -> 
     };
     let jitter = jitter.map_or(0.0, |found| found.value);
     let lattice = lattice.map_or(Lattice::Cubic, |found| found.value);
-    Some(Initial { stress, lattice, jitter, seed: seed.map_or(1, |found| found.value) })
+    let (seed, relax) = (seed.map_or(1, |found| found.value), relax.map_or(0, |found| found.value));
+    Some(Initial { stress, lattice, jitter, seed, relax })
 }
 
 fn end(root: &Table<'_>) -> Option<End> {

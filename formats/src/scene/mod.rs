@@ -292,6 +292,8 @@ pub struct Initial {
     pub jitter: f64,
     /// Of the random displacement.
     pub seed: u64,
+    /// Passes of relaxation.
+    pub relax: u64,
 }
 
 /// Arrangement of particles at the start; each has the volume dx^D.
