@@ -66,6 +66,20 @@ velocity = ["1 m/s", 0, 0]
 wedge = { corner = ["0.2 m", 0, 0], size = ["0.2 m", 0, "0.1 m"], falls = "right" }
 "#;
 
+const PACKED: &str = r#"
+space = "3d"
+spacing = "8 mm"
+symmetry = ["x"]
+[body.column]
+cylinder = { radius = "0.1 m", height = "0.1 m" }
+[body.cube]
+box = { min = ["0.2 m", 0, 0], max = ["0.25 m", "0.1 m", "0.1 m"] }
+[initial]
+lattice = "hexagonal"
+jitter = 0.1
+relax = 3
+"#;
+
 /// A folder of its own for a test.
 struct Place(TempDir);
 
@@ -143,7 +157,7 @@ fn made(scene: &str) -> (Scene, Header, Rows) {
 #[test]
 fn the_particles_do_not_depend_on_the_number_of_ranks() {
     let place = Place::new();
-    for (name, scene) in [("quarter", QUARTER), ("rings", RINGS), ("plane", PLANE)] {
+    for (name, scene) in [("quarter", QUARTER), ("rings", RINGS), ("plane", PLANE), ("packed", PACKED)] {
         let file = place.scene(name, scene);
         let mut digests = Vec::new();
         for ranks in [0, 1, 2, 3, 5] {
