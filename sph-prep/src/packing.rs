@@ -2,7 +2,12 @@
 //!
 //! All of them have their points at crossings (i, j, k) of planes across x, y and z. The cubic lattice takes every
 //! crossing, the others those with i + j + k even: a column along z then holds every other layer, and its neighbours
-//! the layers in between. Under pressure a cubic lattice with the cubic spline is unstable, these are not.
+//! the layers in between.
+//!
+//! Under pressure a cubic lattice buckles, the others don't. Measured on 20^3 particles of 2 mm between smooth walls, at
+//! 10 kPa, without viscosity, from a jitter of 0.001: after 0.05 s particles in the middle have moved by 0.27 spacings
+//! (root mean square) on the cubic lattice with the cubic spline, and 0.06, still growing, with Wendland's kernel; by
+//! 0.006 on the hexagonal and the body-centred one and 0.015 from a relaxed start, all steady, with the cubic spline.
 
 use formats::{
     scene::{Lattice, Scene},

@@ -5,7 +5,7 @@
 //! copies.
 //!
 //! Each rank relaxes the whole of the bodies that it holds particles of: the same bits on any number of ranks, at the
-//! price of memory and time that don't shrink with ranks. Meant for bodies of up to a few million particles.
+//! price of memory and time that don't shrink with ranks. Meant for bodies of up to a million particles or so.
 
 use crate::{lattice::Lattice, shape::Face};
 use formats::{kernel::Kernel, scene::Scene};
