@@ -1,6 +1,6 @@
 //! What follows from the parameters of a law alone: its wave speed, its equation of state, the energy it stores.
 
-use super::{Cone, DruckerPrager, Material, MeanStress, Unyielded, ViscoPlastic};
+use super::{Cone, DruckerPrager, Material, MeanStress, MuI, Unyielded, ViscoPlastic};
 
 impl Material {
     /// Density without stress, kg/m3.
@@ -68,9 +68,32 @@ impl Material {
     }
 }
 
+impl MuI {
+    /// Lower neutral inertial number of the curve mu_s + (mu_2 - mu_s)/(1 + I0/I): below it the incompressible equations are
+    /// ill posed (Barker, Schaeffer, Bohorquez & Gray 2015). With x = I mu'(I)/mu they are well posed where
+    /// 4 x^2 - 4 x + mu^2 (1 - x/2)^2 < 0. None where they are for no I.
+    pub fn neutral_inertial_number(&self) -> Option<f64> {
+        let posed = |ratio: f64| {
+            let rise = (self.friction_dynamic - self.friction_static) * ratio / (1.0 + ratio);
+            let mu = self.friction_static + rise;
+            let x = rise / ((1.0 + ratio) * mu);
+            4.0 * x * x - 4.0 * x + (mu * (1.0 - 0.5 * x)).powi(2) < 0.0
+        };
+        // In steps of a hundredth of a decade of I/I0, then by bisection.
+        let step = |k: i32| 10f64.powf(f64::from(k) / 100.0);
+        let first = (-800..=800).find(|&k| posed(step(k)))?;
+        let (mut low, mut high) = (step(first - 1), step(first));
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if posed(middle) { high = middle } else { low = middle }
+        }
+        Some(high * self.inertial_number)
+    }
+}
+
 impl ViscoPlastic {
     /// c^2 rho0/7, Pa.
-    fn stiffness(&self) -> f64 {
+    pub fn stiffness(&self) -> f64 {
         self.sound_speed.powi(2) * self.density / Self::TAIT_EXPONENT
     }
 
