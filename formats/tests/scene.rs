@@ -1,13 +1,17 @@
 //! Scenes: what good ones become, and what is said about bad ones.
 
+#[path = "support/scenes.rs"]
+mod scenes;
+
 use formats::{
     kernel::Kernel,
     scene::{
-        Body, Cone, DruckerPrager, End, Fault, Initial, InitialStress, Lattice, Material, MeanStress, Numerics, Output,
+        Body, Cone, DruckerPrager, End, Initial, InitialStress, Lattice, Material, MeanStress, Numerics, Output,
         Rotation, Scene, Shape, Slip, Wall, WallKind,
     },
     space::Space,
 };
+use scenes::{bad, faults, good};
 
 /// The least that a scene needs.
 const COLUMN: &str = r#"space = "axisymmetric"
@@ -86,6 +90,7 @@ seed = 7
 courant = 0.3
 viscosity = 0.2
 damping = "2 1/s"
+damping-in-flow = "forced"
 
 [end]
 time = "2 s"
@@ -132,24 +137,6 @@ fn law() -> DruckerPrager {
     }
 }
 
-fn faults(text: &str) -> Vec<Fault> {
-    match Scene::read("scene.toml", text) {
-        Ok(scene) => panic!("no fault was found: {scene:?}"),
-        Err(error) => error.faults,
-    }
-}
-
-/// `scene` with one piece replaced has exactly one fault, at the `line` and `column`, with that phrase.
-#[track_caller]
-fn bad(scene: &str, from: &str, to: &str, place: (usize, usize), key: &str, phrase: &str) {
-    assert_eq!(scene.matches(from).count(), 1, "{from}");
-    let faults = faults(&scene.replace(from, to));
-    let [fault] = faults.as_slice() else { panic!("one fault is expected: {faults:#?}") };
-    assert_eq!((fault.line, fault.column), place, "{fault:?}");
-    assert_eq!(fault.key, key, "{fault:?}");
-    assert!(fault.message.contains(phrase), "{fault:?}");
-}
-
 /// The defaults of the Drucker-Prager law.
 fn numerics() -> Numerics {
     Numerics {
@@ -166,12 +153,6 @@ fn numerics() -> Numerics {
         gradient_correction: false,
         shifting: 0.0,
     }
-}
-
-#[track_caller]
-fn good(scene: &str, from: &str, to: &str) -> Scene {
-    assert_eq!(scene.matches(from).count(), 1, "{from}");
-    Scene::read("scene.toml", &scene.replace(from, to)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
@@ -314,10 +295,10 @@ fn values_out_of_range() {
     bad(EVERYTHING, "jitter = 0.1", "jitter = 0.5", (46, 10), "initial.jitter", "in [0, 0.5)");
     bad(EVERYTHING, "seed = 7", "seed = -7", (47, 8), "initial.seed", "`-7` is not a whole number");
     bad(EVERYTHING, "k0 = 0.43", "k0 = -0.1", (45, 6), "initial.k0", "0 or greater");
-    bad(EVERYTHING, "\"2 s\"", "\"0 s\"", (55, 8), "end.time", "greater than 0");
-    bad(EVERYTHING, "1e-4", "1", (56, 11), "end.at-rest", "in (0, 1)");
-    bad(EVERYTHING, "\"20 ms\"", "\"3 s\"", (59, 13), "output.snapshots", "\"3 s\" is later than end.time = 2 s");
-    bad(EVERYTHING, "\"1 ms\"", "0", (60, 11), "output.history", "greater than 0");
+    bad(EVERYTHING, "\"2 s\"", "\"0 s\"", (56, 8), "end.time", "greater than 0");
+    bad(EVERYTHING, "1e-4", "1", (57, 11), "end.at-rest", "in (0, 1)");
+    bad(EVERYTHING, "\"20 ms\"", "\"3 s\"", (60, 13), "output.snapshots", "\"3 s\" is later than end.time = 2 s");
+    bad(EVERYTHING, "\"1 ms\"", "0", (61, 11), "output.history", "greater than 0");
     bad(COLUMN, "spacing", "gravity = -9.81\nspacing", (2, 11), "gravity", "a magnitude must be 0 or greater");
 }
 

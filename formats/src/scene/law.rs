@@ -1,6 +1,6 @@
 //! What follows from the parameters of a law alone: its wave speed, its equation of state, the energy it stores.
 
-use super::{Cone, DruckerPrager, Material, MeanStress, Unyielded, ViscoPlastic};
+use super::{Cone, DruckerPrager, Material, MeanStress, MuI, Unyielded, ViscoPlastic};
 
 impl Material {
     /// Density without stress, kg/m3.
@@ -21,6 +21,38 @@ impl Material {
                 Unyielded::Elastic(shear) => (law.sound_speed.powi(2) + 4.0 / 3.0 * shear / law.density).sqrt(),
             },
             Self::ViscoPlastic(law) => law.sound_speed,
+        }
+    }
+
+    /// Is it a fluid: does all stress follow from density and strain rate, and none from the strain of earlier steps?
+    pub fn is_fluid(&self) -> bool {
+        match self {
+            Self::DruckerPrager(_) => false,
+            Self::MuI(law) => matches!(law.unyielded, Unyielded::Cap(_)),
+            Self::ViscoPlastic(_) => true,
+        }
+    }
+
+    /// Does the pressure follow from the density alone, whatever happened before?
+    pub fn ties_pressure_to_density(&self) -> bool {
+        match self {
+            Self::DruckerPrager(law) => law.mean_stress == MeanStress::Density,
+            Self::MuI(_) | Self::ViscoPlastic(_) => true,
+        }
+    }
+
+    /// Horizontal over vertical stress where the elastic material is held on its sides: nu/(1 - nu); 1 of a fluid.
+    pub fn elastic_k0(&self) -> f64 {
+        match self {
+            Self::DruckerPrager(law) => law.poisson / (1.0 - law.poisson),
+            Self::MuI(law) => match law.unyielded {
+                Unyielded::Cap(_) => 1.0,
+                Unyielded::Elastic(shear) => {
+                    let bulk = law.bulk();
+                    (3.0 * bulk - 2.0 * shear) / (3.0 * bulk + 4.0 * shear)
+                }
+            },
+            Self::ViscoPlastic(_) => 1.0,
         }
     }
 
@@ -65,6 +97,13 @@ impl Material {
                 law.stiffness() / law.density * ((ratio.powf(n - 1.0) - 1.0) / (n - 1.0) + 1.0 / ratio - 1.0)
             }
         }
+    }
+}
+
+impl MuI {
+    /// Bulk modulus rho0 c^2, Pa.
+    pub fn bulk(&self) -> f64 {
+        self.density * self.sound_speed.powi(2)
     }
 }
 

@@ -4,11 +4,15 @@
 
 mod check;
 mod error;
+mod fit;
 mod front;
 mod geometry;
+mod held;
+mod initial;
 mod law;
 mod material;
 mod numerics;
+mod period;
 mod raw;
 mod walls;
 
