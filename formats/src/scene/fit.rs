@@ -102,7 +102,7 @@ impl Fit<'_> {
         None
     }
 
-    /// Images of images are not made: a mirror must be out of reach of what else mirrors or holds the material.
+    /// A mirror must be out of reach of what else mirrors or holds the material: no particle may lie near both.
     fn too_near(&self, distance: f64, other: &str) -> Option<String> {
         let least = REACH * self.setting.h_over_dx * self.spacing;
         let message = format!("is {distance} m from {other}; a mirror wall must be at least 2.2 h = {least} m away");
