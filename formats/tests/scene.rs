@@ -461,58 +461,6 @@ fn shapes_that_do_not_fit() {
 }
 
 #[test]
-fn bodies_that_overlap() {
-    let bodies = |space: &str, a: &str, b: &str| {
-        let law = "[material.drucker-prager]\ndensity = 1\nyoung = 1\npoisson = 0\nfriction = 0\ncohesion = 0\n[end]\ntime = 1";
-        let text = format!("space = \"{space}\"\nspacing = 0.1\n[body.a]\n{a}\n[body.b]\n{b}\n{law}\n");
-        match Scene::read("scene.toml", &text) {
-            Ok(_) => false,
-            Err(error) => {
-                let [fault] = error.faults.as_slice() else { panic!("{error}") };
-                assert!(fault.message.contains("overlaps body `a`"), "{error}");
-                assert_eq!((fault.line, fault.column), (6, 1));
-                true
-            }
-        }
-    };
-    let block = |min: [f64; 3], max: [f64; 3]| format!("box = {{ min = {min:?}, max = {max:?} }}");
-    let disc = |x: f64, y: f64, z: f64| format!("cylinder = {{ radius = 1, height = 1, base = [{x}, {y}, {z}] }}");
-    let slope =
-        |x: f64, falls: &str| format!("wedge = {{ corner = [{x}, 0, 0], size = [1, 1, 1], falls = \"{falls}\" }}");
-    let unit = block([0.0; 3], [1.0; 3]);
-    for (a, b, expected) in [
-        (unit.clone(), block([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]), false),
-        (unit.clone(), block([0.9, 0.0, 0.0], [2.0, 1.0, 1.0]), true),
-        (unit.clone(), block([0.0, 1.0, 0.0], [1.0, 2.0, 1.0]), false),
-        (unit.clone(), block([0.5, 0.5, 1.0], [1.5, 1.5, 2.0]), false),
-        (unit.clone(), block([0.3, 0.3, 0.3], [0.6, 0.6, 0.6]), true),
-        (disc(0.0, 0.0, 0.0), disc(2.0, 0.0, 0.0), false),
-        (disc(0.0, 0.0, 0.0), disc(1.5, 1.5, 0.0), false),
-        (disc(0.0, 0.0, 0.0), disc(1.3, 1.3, 0.0), true),
-        (disc(0.0, 0.0, 0.0), disc(0.0, 0.0, 1.0), false),
-        (unit.clone(), disc(1.8, 1.8, 0.0), false),
-        (unit.clone(), disc(1.6, 1.6, 0.0), true),
-        (unit.clone(), disc(2.0, 0.5, 0.0), false),
-        (slope(0.0, "right"), block([0.5, 0.0, 0.5], [1.5, 1.0, 1.0]), false),
-        (slope(0.0, "right"), block([0.5, 0.0, 0.4], [1.5, 1.0, 1.0]), true),
-        (slope(0.0, "right"), slope(0.0, "left"), false),
-        (slope(0.0, "right"), slope(2.0, "left"), false),
-        (slope(0.0, "right"), slope(1.9, "left"), true),
-        (slope(0.0, "right"), disc(1.5, 0.5, 0.5), false),
-        (slope(0.0, "right"), disc(1.4, 0.5, 0.5), true),
-    ] {
-        assert_eq!(bodies("3d", &a, &b), expected, "{a} {b}");
-        assert_eq!(bodies("3d", &b, &a), expected, "{b} {a}");
-    }
-    let ring = block([1.0, 0.0, 0.0], [2.0, 0.0, 1.0]);
-    assert!(!bodies("axisymmetric", &disc(0.0, 0.0, 0.0), &ring));
-    assert!(bodies("axisymmetric", &disc(0.0, 0.0, 0.0), &block([0.9, 0.0, 0.0], [2.0, 0.0, 1.0])));
-    assert!(bodies("axisymmetric", &disc(0.0, 0.0, 0.0), &disc(0.0, 0.0, 0.5)));
-    assert!(bodies("plane-strain", &unit, &slope(0.9, "right")));
-    assert!(!bodies("plane-strain", &unit, &slope(1.0, "right")));
-}
-
-#[test]
 fn walls_that_do_not_fit() {
     let wall = |axis: &str, at: f64, side: &str| {
         format!("[wall.other]\naxis = \"{axis}\"\nat = {at}\nside = \"{side}\"\nslip = \"no-slip\"\n[end]")
