@@ -100,13 +100,6 @@ impl Material {
     }
 }
 
-impl MuI {
-    /// Bulk modulus rho0 c^2, Pa.
-    pub fn bulk(&self) -> f64 {
-        self.density * self.sound_speed.powi(2)
-    }
-}
-
 impl ViscoPlastic {
     /// c^2 rho0/7, Pa.
     fn stiffness(&self) -> f64 {
@@ -125,6 +118,13 @@ impl DruckerPrager {
     /// Shear modulus G, Pa.
     pub fn shear(&self) -> f64 {
         self.young / (2.0 * (1.0 + self.poisson))
+    }
+}
+
+impl MuI {
+    /// Bulk modulus rho0 c^2, Pa.
+    pub fn bulk(&self) -> f64 {
+        self.density * self.sound_speed.powi(2)
     }
 }
 

@@ -127,6 +127,13 @@ fn mu_i(table: Table<'_>) -> Option<MuI> {
     {
         table.faults.at(curve, "\"partially-regularised\" needs friction-dynamic above friction-static");
     }
+    if let (Some(shear), Some(density), Some(c)) = (&shear, &density, &sound_speed) {
+        let most = 1.5 * density.value * c.value * c.value;
+        if shear.value > most {
+            let (source, reason) = (table.faults.source(shear), "Poisson's ratio would be negative");
+            table.faults.at(shear, format!("{source} is above 3/2 rho c^2 = {most} Pa: {reason}; it must not be"));
+        }
+    }
     let elastic = unyielded.as_ref().is_some_and(|kind| kind.value == Kind::Elastic);
     if let (Some(cap), true) = (&cap, elastic) {
         table.faults.at(cap, "is used only with unyielded = \"cap\"; drop this key");
@@ -139,16 +146,9 @@ fn mu_i(table: Table<'_>) -> Option<MuI> {
     {
         table.faults.at(norm, "\"printed\" goes with unyielded = \"cap\" only");
     }
-    if let (Some(shear), Some(density), Some(c)) = (&shear, &density, &sound_speed) {
-        let most = 1.5 * density.value * c.value * c.value;
-        if shear.value > most {
-            let (source, reason) = (table.faults.source(shear), "Poisson's ratio would be negative");
-            table.faults.at(shear, format!("{source} is above 3/2 rho c^2 = {most} Pa: {reason}; it must not be"));
-        }
-    }
     table.finish();
     let (density, sound_speed, friction_static) = (density?.value, sound_speed?.value, friction_static?.value);
-    // G/K = 3/2 (1 - 2 nu)/(1 + nu) with Poisson's ratio 0.3 and the bulk modulus K = rho c^2.
+    // That of a solid whose P waves have the speed c in bulk alone and Poisson's ratio 0.3: G/K = 3/2 (1 - 2 nu)/(1 + nu).
     let shear = or(shear, 6.0 / 13.0 * density * sound_speed * sound_speed);
     Some(MuI {
         density,
