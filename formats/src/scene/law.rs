@@ -24,6 +24,38 @@ impl Material {
         }
     }
 
+    /// Is it a fluid: does all stress follow from density and strain rate, and none from the strain of earlier steps?
+    pub fn is_fluid(&self) -> bool {
+        match self {
+            Self::DruckerPrager(_) => false,
+            Self::MuI(law) => matches!(law.unyielded, Unyielded::Cap(_)),
+            Self::ViscoPlastic(_) => true,
+        }
+    }
+
+    /// Does the pressure follow from the density alone, whatever happened before?
+    pub fn ties_pressure_to_density(&self) -> bool {
+        match self {
+            Self::DruckerPrager(law) => law.mean_stress == MeanStress::Density,
+            Self::MuI(_) | Self::ViscoPlastic(_) => true,
+        }
+    }
+
+    /// Horizontal over vertical stress where the elastic material is held on its sides: nu/(1 - nu); 1 of a fluid.
+    pub fn elastic_k0(&self) -> f64 {
+        match self {
+            Self::DruckerPrager(law) => law.poisson / (1.0 - law.poisson),
+            Self::MuI(law) => match law.unyielded {
+                Unyielded::Cap(_) => 1.0,
+                Unyielded::Elastic(shear) => {
+                    let bulk = law.bulk();
+                    (3.0 * bulk - 2.0 * shear) / (3.0 * bulk + 4.0 * shear)
+                }
+            },
+            Self::ViscoPlastic(_) => 1.0,
+        }
+    }
+
     /// Density at which the pressure is `pressure`, kg/m3; the one without stress where a law does not tie the two.
     pub fn density_at(&self, pressure: f64) -> f64 {
         let rho0 = self.density();
@@ -109,6 +141,13 @@ impl DruckerPrager {
     /// Shear modulus G, Pa.
     pub fn shear(&self) -> f64 {
         self.young / (2.0 * (1.0 + self.poisson))
+    }
+}
+
+impl MuI {
+    /// Bulk modulus rho0 c^2, Pa.
+    pub fn bulk(&self) -> f64 {
+        self.density * self.sound_speed.powi(2)
     }
 }
 

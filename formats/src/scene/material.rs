@@ -127,6 +127,13 @@ fn mu_i(table: Table<'_>) -> Option<MuI> {
     {
         table.faults.at(curve, "\"partially-regularised\" needs friction-dynamic above friction-static");
     }
+    if let (Some(shear), Some(density), Some(c)) = (&shear, &density, &sound_speed) {
+        let most = 1.5 * density.value * c.value * c.value;
+        if shear.value > most {
+            let (source, reason) = (table.faults.source(shear), "Poisson's ratio would be negative");
+            table.faults.at(shear, format!("{source} is above 3/2 rho c^2 = {most} Pa: {reason}; it must not be"));
+        }
+    }
     let elastic = unyielded.as_ref().is_some_and(|kind| kind.value == Kind::Elastic);
     if let (Some(cap), true) = (&cap, elastic) {
         table.faults.at(cap, "is used only with unyielded = \"cap\"; drop this key");
