@@ -105,8 +105,8 @@ pub fn commit(
 /// The newest sound generation, or `None` if there is none at all. Serial.
 ///
 /// # Errors
-/// `Damaged` if there are generations but no sound one; `Newer` if the newest was written by a later version;
-/// `CannotRead`.
+/// `Damaged` if there are generations but no sound one; `Newer` or `Older` if the newest sound one was written by
+/// another version; `CannotRead`.
 pub fn latest(folder: &RunFolder) -> Result<Option<Found>, FileError> {
     let mut warnings = Vec::new();
     for generation in generations(folder)?.into_iter().rev() {
@@ -115,8 +115,9 @@ pub fn latest(folder: &RunFolder) -> Result<Option<Found>, FileError> {
                 let state = folder.generation(generation).join(STATE);
                 return Ok(Some(Found { manifest, state, warnings }));
             }
-            // To fall back to an older state because this program is too old would lose work.
-            Err(error @ FileError::Newer { .. }) => return Err(error),
+            // To fall back to an older state because this program is too old would lose work; and what an older one
+            // wrote is not damaged.
+            Err(error @ (FileError::Newer { .. } | FileError::Older { .. })) => return Err(error),
             Err(error) => warnings.push(error),
         }
     }
@@ -161,7 +162,7 @@ pub fn generations(folder: &RunFolder) -> Result<Vec<u64>, FileError> {
 /// together. Serial.
 ///
 /// # Errors
-/// `Damaged`, `Newer`, `CannotRead`.
+/// `Damaged`, `Newer`, `Older`, `CannotRead`.
 pub fn verify(folder: &RunFolder, generation: u64) -> Result<Manifest, FileError> {
     let place = folder.generation(generation);
     let manifest = read_manifest(&place, generation)?;

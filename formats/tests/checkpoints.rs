@@ -156,6 +156,22 @@ fn damaged_generations_are_passed_over() {
     assert!(error.to_string().contains("gen-000004") && error.to_string().contains("gen-000005"), "{error}");
 }
 
+/// A checkpoint of an earlier version is sound: it is named for what it is, not passed over as damaged.
+#[test]
+fn checkpoints_of_an_older_version_are_told_apart() {
+    let (_place, folder) = after("one", 1);
+    let (state, manifest) = (folder.generation(1).join("state.hdf"), folder.generation(1).join("MANIFEST.json"));
+    let file = hdf5::File::open_rw(&state).unwrap();
+    file.group("sph").unwrap().attr("format_version").unwrap().write_scalar(&1u64).unwrap();
+    file.close().unwrap();
+    let mut sealed: serde_json::Value = serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap();
+    sealed["manifest"]["state_sha256"] = provenance::sha256(&fs::read(&state).unwrap()).into();
+    sealed["sha256"] = provenance::sha256(sealed["manifest"].to_string().as_bytes()).into();
+    fs::write(&manifest, sealed.to_string()).unwrap();
+    let error = checkpoint::latest(&folder).unwrap_err();
+    assert!(matches!(error, FileError::Older { found: 1, known: 2, .. }), "{error}");
+}
+
 #[test]
 fn a_failed_commit_leaves_the_older_ones() {
     let (place, folder) = after("five", 2);

@@ -243,7 +243,17 @@ fn changed_files_are_named_for_what_they_are() {
         }
     };
     let newer = changed(folder.path(), attribute("format_version", 3));
-    assert!(matches!(newer, FileError::Newer { found: 2, known: 1, .. }), "{newer}");
+    assert!(matches!(newer, FileError::Newer { found: 3, known: 2, .. }), "{newer}");
+    // Older files lack fields: their version is told, not what is missing.
+    let older = changed(folder.path(), |file| {
+        attribute("format_version", 1)(file);
+        file.unlink("particles/stress_work").unwrap();
+    });
+    assert!(matches!(older, FileError::Older { found: 1, known: 2, .. }), "{older}");
+    assert_eq!(older.exit_code(), 65);
+    assert!(
+        older.to_string().ends_with("has format version 1, this program reads 2; prepare the scene anew with sph-prep")
+    );
     let damaged = |error: FileError, word: &str| {
         assert!(matches!(error, FileError::Damaged { .. }) && error.to_string().contains(word), "{error}");
     };
@@ -278,7 +288,7 @@ fn flipped_bits_never_crash() {
         }
     }
     eprintln!("{} bytes: {noticed} noticed at once, {values} change the digest, {unread} are not ours", bytes.len());
-    // Three particles of 20 numbers; the rest that is read carries HDF5's checksums.
-    assert_eq!(values, 3 * 8 * 20);
+    // Three particles of 22 numbers; the rest that is read carries HDF5's checksums.
+    assert_eq!(values, 3 * 8 * 22);
     assert!(noticed > 0);
 }

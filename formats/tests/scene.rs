@@ -1,13 +1,17 @@
 //! Scenes: what good ones become, and what is said about bad ones.
 
+#[path = "support/scenes.rs"]
+mod scenes;
+
 use formats::{
     kernel::Kernel,
     scene::{
-        Body, Cone, DruckerPrager, End, Fault, Initial, InitialStress, Lattice, Material, MeanStress, Numerics, Output,
+        Body, Cone, DruckerPrager, End, Initial, InitialStress, Lattice, Material, MeanStress, Numerics, Output,
         Rotation, Scene, Shape, Slip, Wall, WallKind,
     },
     space::Space,
 };
+use scenes::{bad, faults, good};
 
 /// The least that a scene needs.
 const COLUMN: &str = r#"space = "axisymmetric"
@@ -86,6 +90,7 @@ seed = 7
 courant = 0.3
 viscosity = 0.2
 damping = "2 1/s"
+damping-in-flow = "forced"
 
 [end]
 time = "2 s"
@@ -132,24 +137,6 @@ fn law() -> DruckerPrager {
     }
 }
 
-fn faults(text: &str) -> Vec<Fault> {
-    match Scene::read("scene.toml", text) {
-        Ok(scene) => panic!("no fault was found: {scene:?}"),
-        Err(error) => error.faults,
-    }
-}
-
-/// `scene` with one piece replaced has exactly one fault, at the `line` and `column`, with that phrase.
-#[track_caller]
-fn bad(scene: &str, from: &str, to: &str, place: (usize, usize), key: &str, phrase: &str) {
-    assert_eq!(scene.matches(from).count(), 1, "{from}");
-    let faults = faults(&scene.replace(from, to));
-    let [fault] = faults.as_slice() else { panic!("one fault is expected: {faults:#?}") };
-    assert_eq!((fault.line, fault.column), place, "{fault:?}");
-    assert_eq!(fault.key, key, "{fault:?}");
-    assert!(fault.message.contains(phrase), "{fault:?}");
-}
-
 /// The defaults of the Drucker-Prager law.
 fn numerics() -> Numerics {
     Numerics {
@@ -166,12 +153,6 @@ fn numerics() -> Numerics {
         gradient_correction: false,
         shifting: 0.0,
     }
-}
-
-#[track_caller]
-fn good(scene: &str, from: &str, to: &str) -> Scene {
-    assert_eq!(scene.matches(from).count(), 1, "{from}");
-    Scene::read("scene.toml", &scene.replace(from, to)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
@@ -325,10 +306,10 @@ fn values_out_of_range() {
     bad(EVERYTHING, "jitter = 0.1", "jitter = 0.5", (46, 10), "initial.jitter", "in [0, 0.5)");
     bad(EVERYTHING, "seed = 7", "seed = -7", (47, 8), "initial.seed", "`-7` is not a whole number");
     bad(EVERYTHING, "k0 = 0.43", "k0 = -0.1", (45, 6), "initial.k0", "0 or greater");
-    bad(EVERYTHING, "\"2 s\"", "\"0 s\"", (55, 8), "end.time", "greater than 0");
-    bad(EVERYTHING, "1e-4", "1", (56, 11), "end.at-rest", "in (0, 1)");
-    bad(EVERYTHING, "\"20 ms\"", "\"3 s\"", (59, 13), "output.snapshots", "\"3 s\" is later than end.time = 2 s");
-    bad(EVERYTHING, "\"1 ms\"", "0", (60, 11), "output.history", "greater than 0");
+    bad(EVERYTHING, "\"2 s\"", "\"0 s\"", (56, 8), "end.time", "greater than 0");
+    bad(EVERYTHING, "1e-4", "1", (57, 11), "end.at-rest", "in (0, 1)");
+    bad(EVERYTHING, "\"20 ms\"", "\"3 s\"", (60, 13), "output.snapshots", "\"3 s\" is later than end.time = 2 s");
+    bad(EVERYTHING, "\"1 ms\"", "0", (61, 11), "output.history", "greater than 0");
     bad(COLUMN, "spacing", "gravity = -9.81\nspacing", (2, 11), "gravity", "a magnitude must be 0 or greater");
 }
 
@@ -488,58 +469,6 @@ fn shapes_that_do_not_fit() {
         EVERYTHING.replace("10 mm", "1 um").replace("0.5 m", "0.4 m").replace("at = \"500 mm\"", "at = \"900 mm\"");
     let cylinder = "radius = \"0.2 m\", height = \"0.2 m\"";
     bad(&many, cylinder, "radius = 0.2, height = 0.01", (29, 1), "body.ramp.wedge", "there must be fewer than 2^40");
-}
-
-#[test]
-fn bodies_that_overlap() {
-    let bodies = |space: &str, a: &str, b: &str| {
-        let law = "[material.drucker-prager]\ndensity = 1\nyoung = 1\npoisson = 0\nfriction = 0\ncohesion = 0\n[end]\ntime = 1";
-        let text = format!("space = \"{space}\"\nspacing = 0.1\n[body.a]\n{a}\n[body.b]\n{b}\n{law}\n");
-        match Scene::read("scene.toml", &text) {
-            Ok(_) => false,
-            Err(error) => {
-                let [fault] = error.faults.as_slice() else { panic!("{error}") };
-                assert!(fault.message.contains("overlaps body `a`"), "{error}");
-                assert_eq!((fault.line, fault.column), (6, 1));
-                true
-            }
-        }
-    };
-    let block = |min: [f64; 3], max: [f64; 3]| format!("box = {{ min = {min:?}, max = {max:?} }}");
-    let disc = |x: f64, y: f64, z: f64| format!("cylinder = {{ radius = 1, height = 1, base = [{x}, {y}, {z}] }}");
-    let slope =
-        |x: f64, falls: &str| format!("wedge = {{ corner = [{x}, 0, 0], size = [1, 1, 1], falls = \"{falls}\" }}");
-    let unit = block([0.0; 3], [1.0; 3]);
-    for (a, b, expected) in [
-        (unit.clone(), block([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]), false),
-        (unit.clone(), block([0.9, 0.0, 0.0], [2.0, 1.0, 1.0]), true),
-        (unit.clone(), block([0.0, 1.0, 0.0], [1.0, 2.0, 1.0]), false),
-        (unit.clone(), block([0.5, 0.5, 1.0], [1.5, 1.5, 2.0]), false),
-        (unit.clone(), block([0.3, 0.3, 0.3], [0.6, 0.6, 0.6]), true),
-        (disc(0.0, 0.0, 0.0), disc(2.0, 0.0, 0.0), false),
-        (disc(0.0, 0.0, 0.0), disc(1.5, 1.5, 0.0), false),
-        (disc(0.0, 0.0, 0.0), disc(1.3, 1.3, 0.0), true),
-        (disc(0.0, 0.0, 0.0), disc(0.0, 0.0, 1.0), false),
-        (unit.clone(), disc(1.8, 1.8, 0.0), false),
-        (unit.clone(), disc(1.6, 1.6, 0.0), true),
-        (unit.clone(), disc(2.0, 0.5, 0.0), false),
-        (slope(0.0, "right"), block([0.5, 0.0, 0.5], [1.5, 1.0, 1.0]), false),
-        (slope(0.0, "right"), block([0.5, 0.0, 0.4], [1.5, 1.0, 1.0]), true),
-        (slope(0.0, "right"), slope(0.0, "left"), false),
-        (slope(0.0, "right"), slope(2.0, "left"), false),
-        (slope(0.0, "right"), slope(1.9, "left"), true),
-        (slope(0.0, "right"), disc(1.5, 0.5, 0.5), false),
-        (slope(0.0, "right"), disc(1.4, 0.5, 0.5), true),
-    ] {
-        assert_eq!(bodies("3d", &a, &b), expected, "{a} {b}");
-        assert_eq!(bodies("3d", &b, &a), expected, "{b} {a}");
-    }
-    let ring = block([1.0, 0.0, 0.0], [2.0, 0.0, 1.0]);
-    assert!(!bodies("axisymmetric", &disc(0.0, 0.0, 0.0), &ring));
-    assert!(bodies("axisymmetric", &disc(0.0, 0.0, 0.0), &block([0.9, 0.0, 0.0], [2.0, 0.0, 1.0])));
-    assert!(bodies("axisymmetric", &disc(0.0, 0.0, 0.0), &disc(0.0, 0.0, 0.5)));
-    assert!(bodies("plane-strain", &unit, &slope(0.9, "right")));
-    assert!(!bodies("plane-strain", &unit, &slope(1.0, "right")));
 }
 
 #[test]

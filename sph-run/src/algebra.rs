@@ -103,6 +103,13 @@ impl<const N: usize> Sym<N> {
     }
 }
 
+impl<const D: usize> Add for Matrix<D> {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self(std::array::from_fn(|a| std::array::from_fn(|b| self.0[a][b] + other.0[a][b])))
+    }
+}
+
 impl<const D: usize> Default for Matrix<D> {
     fn default() -> Self {
         Self([[0.0; D]; D])
@@ -110,6 +117,40 @@ impl<const D: usize> Default for Matrix<D> {
 }
 
 impl<const D: usize> Matrix<D> {
+    /// The unit tensor.
+    pub fn unit() -> Self {
+        Self(std::array::from_fn(|a| std::array::from_fn(|b| if a == b { 1.0 } else { 0.0 })))
+    }
+    /// Matrix times vector.
+    #[inline(always)]
+    pub fn times(&self, v: Vector<D>) -> Vector<D> {
+        Vector(std::array::from_fn(|a| Vector(self.0[a]).dot(v)))
+    }
+    /// Matrix product.
+    pub fn product(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|a| {
+            std::array::from_fn(|b| (0..D).fold(0.0, |sum, c| sum + self.0[a][c] * other.0[c][b]))
+        }))
+    }
+    /// Determinant; D is 2 or 3.
+    pub fn determinant(&self) -> f64 {
+        (0..D).fold(0.0, |sum, b| sum + self.0[0][b] * self.cofactor(0, b))
+    }
+    /// Inverse, given the determinant.
+    pub fn inverse(&self, determinant: f64) -> Self {
+        Self(std::array::from_fn(|a| std::array::from_fn(|b| self.cofactor(b, a) / determinant)))
+    }
+    fn cofactor(&self, a: usize, b: usize) -> f64 {
+        const { assert!(D == 2 || D == 3) };
+        let m = &self.0;
+        if D == 2 {
+            let minor = m[1 - a][1 - b];
+            return if a == b { minor } else { -minor };
+        }
+        // Cyclic indices carry the sign.
+        let (r, s, u, v) = ((a + 1) % D, (a + 2) % D, (b + 1) % D, (b + 2) % D);
+        m[r][u] * m[s][v] - m[r][v] * m[s][u]
+    }
     /// Adds `factor a (x) b`.
     #[inline(always)]
     pub fn add_outer(&mut self, factor: f64, a: Vector<D>, b: Vector<D>) {
@@ -119,5 +160,63 @@ impl<const D: usize> Matrix<D> {
                 self.0[i][j] += f * b.0[j];
             }
         }
+    }
+}
+
+/// The part of a symmetric tensor (xx yy zz xy yz xz) with its positive principal values only, by Jacobi rotations.
+pub fn tensile_part(s: [f64; 6]) -> [f64; 6] {
+    let mut m = [[s[0], s[3], s[5]], [s[3], s[1], s[4]], [s[5], s[4], s[2]]];
+    let mut axes = Matrix::<3>::unit().0;
+    // Quadratic convergence: six sweeps reach rounding from any start.
+    for _ in 0..6 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if m[p][q] == 0.0 {
+                continue;
+            }
+            let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
+            let t = 1.0_f64.copysign(theta) / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let cos = 1.0 / (t * t + 1.0).sqrt();
+            let sin = t * cos;
+            for row in &mut m {
+                (row[p], row[q]) = (cos * row[p] - sin * row[q], sin * row[p] + cos * row[q]);
+            }
+            for k in 0..3 {
+                (m[p][k], m[q][k]) = (cos * m[p][k] - sin * m[q][k], sin * m[p][k] + cos * m[q][k]);
+                (axes[k][p], axes[k][q]) = (cos * axes[k][p] - sin * axes[k][q], sin * axes[k][p] + cos * axes[k][q]);
+            }
+        }
+    }
+    let element = |a: usize, b: usize| (0..3).map(|k| m[k][k].max(0.0) * axes[a][k] * axes[b][k]).sum();
+    [element(0, 0), element(1, 1), element(2, 2), element(0, 1), element(1, 2), element(0, 2)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_inverse_of_a_matrix() {
+        let m = Matrix([[2.0, 0.3, -0.5], [0.1, 1.5, 0.7], [0.4, -0.2, 0.9]]);
+        let one = m.product(&m.inverse(m.determinant()));
+        for (row, unit) in one.0.iter().zip(Matrix::<3>::unit().0) {
+            assert!(row.iter().zip(unit).all(|(a, b)| (a - b).abs() < 1e-14), "{one:?}");
+        }
+        let m = Matrix([[2.0, 0.3], [0.1, 1.5]]);
+        assert!((m.determinant() - 2.97).abs() < 1e-15);
+        assert!((m.product(&m.inverse(2.97)).0[1][0]).abs() < 1e-16);
+    }
+
+    /// Tensile and compressive part add up, share the principal axes, and have no product.
+    #[test]
+    fn a_tensor_splits_into_tension_and_compression() {
+        let s = [3.0, -2.0, 0.5, 1.0, -0.7, 2.0];
+        let (t, c) = (tensile_part(s), tensile_part(s.map(|x| -x)).map(|x| -x));
+        assert!((0..6).all(|k| (t[k] + c[k] - s[k]).abs() < 1e-13), "{t:?} {c:?}");
+        let matrix = |s: [f64; 6]| Matrix([[s[0], s[3], s[5]], [s[3], s[1], s[4]], [s[5], s[4], s[2]]]);
+        let product = matrix(t).product(&matrix(c));
+        assert!(product.0.iter().flatten().all(|x| x.abs() < 1e-13), "{product:?}");
+        // In the plane: a pure shear pulls along the diagonal with its own size.
+        let t = tensile_part([0.0, 0.0, 0.0, 0.0, 0.0, 2.0]);
+        assert!((t[0] - 1.0).abs() < 1e-15 && (t[2] - 1.0).abs() < 1e-15 && (t[5] - 1.0).abs() < 1e-15, "{t:?}");
     }
 }

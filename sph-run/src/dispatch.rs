@@ -1,6 +1,6 @@
 //! From the scene's choices to types: the one place where space, kernel and material become type parameters.
 
-use crate::material::{DruckerPrager, Material};
+use crate::material::{DruckerPrager, Material, MuI, ViscoPlastic};
 use crate::physics::{CubicSpline, Kernel, Model, Physics, WendlandC2};
 use crate::space::{Axisymmetric, PlaneStrain, ThreeD};
 use formats::scene::{Material as Law, Scene};
@@ -16,7 +16,8 @@ pub trait Job {
 pub fn resolve<J: Job>(scene: &Scene, job: J) -> J::Output {
     match &scene.material {
         Law::DruckerPrager(law) => with_material(scene, DruckerPrager::new(law), job),
-        Law::MuI(_) | Law::ViscoPlastic(_) => todo!(),
+        Law::MuI(law) => with_material(scene, MuI::new(law, scene), job),
+        Law::ViscoPlastic(law) => with_material(scene, ViscoPlastic::new(law), job),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Granular flow by smoothed particle hydrodynamics, distributed over MPI ranks.
 //!
 //! A step reads as in [`step`]: kick, drift, refill what surrounds the particles, stress, acceleration, kick.
-//! Types are chosen once in [`dispatch`]; the only loops over pairs are in [`sweep`].
+//! Types are chosen once in [`dispatch`]; the only loop over pairs is in [`sweep`], what it sums in [`rates`].
 
 pub mod algebra;
 pub mod boundary;
@@ -17,11 +17,13 @@ pub mod parallel;
 pub mod particles;
 pub mod physics;
 pub mod progress;
+pub mod rates;
 pub mod report;
 pub mod resume;
 pub mod run;
 pub mod simulation;
 pub mod space;
+pub mod stabilize;
 pub mod step;
 pub mod sweep;
 pub mod timestep;

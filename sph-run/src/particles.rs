@@ -42,6 +42,9 @@ pub struct Particles<const D: usize, const N: usize> {
     /// Stress, Pa.
     pub stress: Vec<Sym<N>>,
 
+    /// Viscosity between particles, Pa s; of laws without one it is never filled.
+    pub viscosity: Vec<f64>,
+
     /// Acceleration, m/s2.
     pub a: Vec<Vector<D>>,
     /// Mass, kg.
@@ -87,6 +90,7 @@ impl<const D: usize, const N: usize> Particles<D, N> {
             particles.body.push(rows.body[i]);
         }
         particles.volume = vec![0.0; rows.len()];
+        particles.viscosity = vec![0.0; rows.len()];
         particles.own(rows.len());
         particles
     }
@@ -123,6 +127,7 @@ impl<const D: usize, const N: usize> Particles<D, N> {
         self.v.resize(len, Vector::default());
         self.volume.resize(len, 0.0);
         self.stress.resize(len, Sym::default());
+        self.viscosity.resize(len, 0.0);
     }
 
     /// Number of particles in all ranges.
@@ -163,6 +168,7 @@ impl<const D: usize, const N: usize> Particles<D, N> {
             self.a.push(vector(7 + 2 * D));
             self.stress.push(Sym(std::array::from_fn(|a| real(7 + 3 * D + a))));
             self.volume.push(0.0);
+            self.viscosity.push(0.0);
         }
         self.own(self.key.len());
     }
@@ -177,6 +183,7 @@ impl<const D: usize, const N: usize> Particles<D, N> {
         pick(&mut self.v, order);
         pick(&mut self.volume, order);
         pick(&mut self.stress, order);
+        pick(&mut self.viscosity, order);
         pick(&mut self.a, order);
         pick(&mut self.mass, order);
         pick(&mut self.density, order);

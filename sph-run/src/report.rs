@@ -1,20 +1,25 @@
 //! The lines of the history: totals over all ranks, the same bits on any number of them.
 
 use crate::exact::{self, Sum};
-use crate::material::Material;
 use crate::parallel::comm::Reduce;
 use crate::physics::Physics;
 use crate::simulation::Simulation;
 use crate::space::Space;
-use formats::scene::Scene;
+use formats::scene::{Material, Scene};
 
 /// Names and units of the columns, as in the first line of the file. Energies are per metre of depth in plane strain.
-pub fn columns(space: formats::space::Space) -> [&'static str; 14] {
-    let [kinetic, potential, elastic] = match space {
-        formats::space::Space::PlaneStrain => {
-            ["kinetic_energy [J/m]", "potential_energy [J/m]", "elastic_energy [J/m]"]
+pub fn columns(space: formats::space::Space) -> [&'static str; 16] {
+    let [kinetic, potential, elastic, stress_work, viscous_work] = match space {
+        formats::space::Space::PlaneStrain => [
+            "kinetic_energy [J/m]",
+            "potential_energy [J/m]",
+            "elastic_energy [J/m]",
+            "stress_work [J/m]",
+            "viscous_work [J/m]",
+        ],
+        _ => {
+            ["kinetic_energy [J]", "potential_energy [J]", "elastic_energy [J]", "stress_work [J]", "viscous_work [J]"]
         }
-        _ => ["kinetic_energy [J]", "potential_energy [J]", "elastic_energy [J]"],
     };
     [
         "time [s]",
@@ -23,6 +28,8 @@ pub fn columns(space: formats::space::Space) -> [&'static str; 14] {
         kinetic,
         potential,
         elastic,
+        stress_work,
+        viscous_work,
         "max_speed [m/s]",
         "front [m]",
         "front_mass_99_5 [m]",
@@ -40,6 +47,10 @@ pub struct Line {
     pub kinetic: f64,
     pub potential: f64,
     pub elastic: f64,
+    /// Work the stress has done on the material: stored or turned into heat.
+    pub stress_work: f64,
+    /// Heat of the viscosity between particles.
+    pub viscous_work: f64,
     pub max_speed: f64,
     /// Farthest particle from the axis ([`Scene::is_radial`]), or from x = 0 along +x, plus half a spacing, m.
     pub front: f64,
@@ -56,8 +67,9 @@ pub struct Line {
 }
 
 /// What the totals need of the scene.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Scales {
+    material: Material,
     radial: bool,
     floor: f64,
     density: f64,
@@ -69,13 +81,18 @@ const MASS_SHARE: f64 = 0.995;
 impl Scales {
     /// From the scene.
     pub fn new(scene: &Scene) -> Self {
-        Self { radial: scene.is_radial(), floor: scene.floor(), density: scene.material.density() }
+        Self {
+            material: scene.material.clone(),
+            radial: scene.is_radial(),
+            floor: scene.floor(),
+            density: scene.material.density(),
+        }
     }
 }
 
 impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Totals of the present state. Collective.
-    pub fn totals(&self, scales: Scales) -> Line {
+    pub fn totals(&self, scales: &Scales) -> Line {
         let (p, par) = (&self.particles, &self.parameters);
         let place = |i: usize| P::Space::to_disk(p.x[i]);
         let distance = |x: [f64; 3]| if scales.radial { (x[0] * x[0] + x[1] * x[1]).sqrt() } else { x[0] };
@@ -93,27 +110,33 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
         let mass_bound = max_mass * par.count as f64;
         let energy_bound = mass_bound * par.sound_speed * par.sound_speed;
-        let mut sums =
-            [energy_bound, energy_bound, energy_bound, mass_bound / scales.density, mass_bound].map(Sum::new);
+        let volume_bound = mass_bound / scales.density;
+        let e = energy_bound;
+        let mut sums = [e, e, e, e, e, volume_bound, mass_bound].map(Sum::new);
         let mut below = [0u64];
         for i in 0..p.owned {
             let volume = p.mass[i] / p.density[i];
             sums[0].add(0.5 * p.mass[i] * p.v[i].norm2());
             sums[1].add(-p.mass[i] * self.gravity.dot(p.x[i]));
-            sums[2].add(volume * self.material.elastic_energy(p.stress[i]));
-            sums[3].add(volume);
-            sums[4].add(p.mass[i]);
+            let stress = P::Space::stress_to_disk(p.stress[i]);
+            sums[2].add(p.mass[i] * scales.material.stored_energy(stress, p.density[i]));
+            sums[3].add(p.mass[i] * p.work[i].stress);
+            sums[4].add(p.mass[i] * p.work[i].viscous);
+            sums[5].add(volume);
+            sums[6].add(p.mass[i]);
             below[0] += u64::from(self.walls.distance::<D, N, P::Space>(p.x[i]) < 0.0);
         }
         exact::reduce(self.comm, &mut sums);
         self.comm.sum(&mut below);
-        let [kinetic, potential, elastic, volume, mass] = sums.map(|s| s.value());
+        let [kinetic, potential, elastic, stress_work, viscous_work, volume, mass] = sums.map(|s| s.value());
 
         let masses = (0..p.owned).map(|i| (distance(place(i)), p.mass[i]));
         Line {
             kinetic,
             potential,
             elastic,
+            stress_work,
+            viscous_work,
             max_speed: speed2.sqrt(),
             front: farthest + 0.5 * par.spacing,
             front_mass: self.quantile(masses, farthest, mass),
@@ -163,6 +186,8 @@ impl Line {
             e(self.kinetic),
             e(self.potential),
             e(self.elastic),
+            e(self.stress_work),
+            e(self.viscous_work),
             e(self.max_speed),
             e(self.front),
             e(self.front_mass),

@@ -62,7 +62,7 @@ impl Job for Run<'_> {
             Simulation::<D, N, P>::new(self.comm, self.scene, material, particles, count, self.start.clock);
         simulation.always_rebalance = self.cli.always_rebalance;
         if self.start.fresh() {
-            simulation.accelerate();
+            simulation.begin();
         }
         let files = agree(self.comm, || Files::open(self.folder, &self.start, self.scene.space))?;
         let progress = Progress::new(self.cli.quiet || rank != 0, &simulation.clock, self.scene.end.time, count);
@@ -141,7 +141,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         }
         let mut at_rest = false;
         if line_due {
-            let line = self.simulation.totals(self.scales);
+            let line = self.simulation.totals(&self.scales);
             let peak = clock.peak_kinetic.max(line.kinetic);
             at_rest = scene.end.at_rest.is_some_and(|fraction| line.kinetic < fraction * peak);
             self.simulation.clock.peak_kinetic = peak;

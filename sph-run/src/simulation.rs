@@ -1,8 +1,10 @@
 //! Everything one rank knows: its particles, what surrounds them, and where the run stands.
 
-use crate::algebra::{Matrix, Sym, Vector};
+use crate::algebra::{Matrix, Vector};
+use crate::boundary::field::Field;
 use crate::boundary::mirror::{Image, Mirrors};
 use crate::boundary::wall::Walls;
+use crate::material::Material as _;
 use crate::neighbors::{Neighbors, cell_order};
 use crate::parallel::halo::{Fields, Halo};
 use crate::parallel::migrate;
@@ -10,7 +12,9 @@ use crate::parallel::orb::Tree;
 use crate::parallel::{Reduce, changed};
 use crate::particles::Particles;
 use crate::physics::Physics;
+use crate::rates::momentum::Viscosity;
 use crate::space::Space;
+use crate::stabilize::{Buffers, Stabilisers};
 use crate::sweep::Pairs;
 use formats::h5::Communicator;
 use formats::scene::{Scene, WallLattice};
@@ -25,12 +29,16 @@ pub struct Parameters {
     pub h: f64,
     pub sound_speed: f64,
     pub courant: f64,
+    /// Longest step the viscosity allows, s.
+    pub viscous_step: f64,
     pub damping: f64,
     /// Density below which the material carries no stress, kg/m3.
     pub gate: f64,
     /// Skin of the neighbour lists, m.
     pub skin: f64,
     pub pairs: Pairs,
+    pub viscosity: Viscosity,
+    pub stabilisers: Stabilisers,
     /// Number of all particles on all ranks.
     pub count: u64,
 }
@@ -78,7 +86,7 @@ pub struct Simulation<'a, const D: usize, const N: usize, P: Physics<D, N>> {
     /// Positions when the neighbour lists were built.
     pub x_build: Vec<Vector<D>>,
     pub gradient: Vec<Matrix<D>>,
-    pub weighted: Vec<Sym<N>>,
+    pub buffers: Buffers<D, N>,
     /// Share the particles out anew at every build of the lists: for tests.
     pub always_rebalance: bool,
 }
@@ -95,7 +103,15 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
     ) -> Self {
         let (h, dx) = (scene.h(), scene.spacing);
         let sound_speed = scene.material.sound_speed();
-        let viscosity = scene.numerics.viscosity * h * sound_speed * scene.material.density();
+        let numerics = &scene.numerics;
+        let viscosity = Viscosity {
+            strength: numerics.viscosity * h * sound_speed * scene.material.density(),
+            below: if numerics.viscosity_on_approach { 0.0 } else { f64::INFINITY },
+        };
+        // Szewc 2017, Eq 12.
+        let viscous_step = material
+            .largest_viscosity()
+            .map_or(f64::INFINITY, |largest| numerics.viscous_courant * scene.material.density() * h * h / largest);
         let axisymmetric = scene.space == formats::space::Space::Axisymmetric;
         let axes = scene.space.axes();
         let tree = Tree::build(particles.x.iter().map(|&x| P::Space::to_disk(x)), None, axes, comm);
@@ -106,11 +122,14 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
                 spacing: dx,
                 h,
                 sound_speed,
-                courant: scene.numerics.courant,
-                damping: scene.numerics.damping,
-                gate: scene.numerics.density_gate * scene.material.density(),
+                courant: numerics.courant,
+                viscous_step,
+                damping: numerics.damping,
+                gate: numerics.density_gate * scene.material.density(),
                 skin: SKIN * h,
-                pairs: Pairs { h, spacing: dx, viscosity },
+                pairs: Pairs { h, spacing: dx },
+                viscosity,
+                stabilisers: Stabilisers::new(scene),
                 count,
             },
             gravity: P::Space::from_disk(scene.gravity),
@@ -124,7 +143,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
             has_walls: !scene.walls.is_empty(),
             x_build: Vec::new(),
             gradient: Vec::new(),
-            weighted: Vec::new(),
+            buffers: Buffers::default(),
             always_rebalance: false,
         };
         simulation.settle();
@@ -192,6 +211,12 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
                 self.walls.fill_stress::<D, N, P::Space>(p, &self.neighbors);
             }
         }
+    }
+
+    /// Gives a field that only owned particles have to all copies and images of them, and zero to wall particles.
+    pub fn spread<T: Field<D, N>>(&mut self, field: &mut Vec<T>) {
+        self.partition.halo.spread(self.comm, self.particles.owned, field);
+        Mirrors::spread::<D, N, P::Space, T>(&self.particles, &self.images, field);
     }
 
     /// Volumes of the owned particles from mass, density and place.

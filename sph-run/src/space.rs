@@ -26,6 +26,9 @@ pub trait Space<const D: usize, const N: usize>: Copy + Debug + Default + Send +
     /// stress . n
     fn traction(stress: &Sym<N>, n: Vector<D>) -> Vector<D>;
 
+    /// The tensor as a matrix of the D coordinates.
+    fn matrix(stress: &Sym<N>) -> Matrix<D>;
+
     /// The part of the acceleration that is not a pair sum: -sigma_theta/(rho r) e_r in the axisymmetric space.
     fn hoop(stress: &Sym<N>, density: f64, x: Vector<D>, spacing: f64) -> Vector<D>;
 
@@ -61,6 +64,10 @@ mod plane {
         let [x, z] = n.0;
         Vector([xx * x + xz * z, xz * x + zz * z])
     }
+    pub fn matrix(s: &Sym<4>) -> Matrix<2> {
+        let [xx, _, zz, xz] = s.0;
+        Matrix([[xx, xz], [xz, zz]])
+    }
     pub fn spin(g: &Matrix<2>) -> [f64; 3] {
         [0.0, 0.5 * (g.0[0][1] - g.0[1][0]), 0.0]
     }
@@ -88,6 +95,9 @@ macro_rules! plane_layout {
     () => {
         fn traction(s: &Sym<4>, n: Vector<2>) -> Vector<2> {
             plane::traction(s, n)
+        }
+        fn matrix(s: &Sym<4>) -> Matrix<2> {
+            plane::matrix(s)
         }
         fn spin(g: &Matrix<2>) -> [f64; 3] {
             plane::spin(g)
@@ -167,6 +177,10 @@ impl Space<3, 6> for ThreeD {
         let [xx, yy, zz, xy, yz, xz] = s.0;
         let [x, y, z] = n.0;
         Vector([xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z])
+    }
+    fn matrix(s: &Sym<6>) -> Matrix<3> {
+        let [xx, yy, zz, xy, yz, xz] = s.0;
+        Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     }
     fn hoop(_: &Sym<6>, _: f64, _: Vector<3>, _: f64) -> Vector<3> {
         Vector::default()

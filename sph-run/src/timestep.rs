@@ -34,7 +34,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Plans the step towards `event`, the next time at which something is due. Collective.
     ///
     /// dt = courant min(h/(c + |v|), sqrt(h/|a|)) over all particles (Yang et al. 2020, Eq 40, with the velocity and
-    /// the force criterion of Monaghan 1992), shortened to meet the event exactly.
+    /// the force criterion of Monaghan 1992), at most viscous_courant rho0 h^2/mu_max (Szewc 2017, Eq 12), shortened to
+    /// meet the event exactly.
     pub fn plan(&self, event: f64, requests: Requests) -> Result<Plan, Fault> {
         let (p, par) = (&self.particles, &self.parameters);
         let mut largest = [0.0_f64; 6];
@@ -62,7 +63,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         }
         let acoustic = par.h / (par.sound_speed + v);
         let force = if a > 0.0 { (par.h / a).sqrt() } else { f64::INFINITY };
-        let dt = par.courant * acoustic.min(force);
+        let dt = (par.courant * acoustic.min(force)).min(par.viscous_step);
         if dt < 1e-6 * par.h / par.sound_speed {
             return Err(Fault::TimeStepVanishes { step: self.clock.step, time_step: dt });
         }

@@ -2,7 +2,7 @@
 
 use formats::scene::{Cone, DruckerPrager as Sand, Rotation};
 use sph_run::algebra::Sym;
-use sph_run::material::{DruckerPrager, History, Material};
+use sph_run::material::{DruckerPrager, History, Increment, Material};
 
 /// F12: expanded by a fifth without stress, then compressed back. The law alone ends under the pressure K ln(1/0.8), as if
 /// nothing had opened; with the gate the stress comes back with the density only.
@@ -25,7 +25,8 @@ fn the_density_gate_gives_volume_back() {
         for k in 0..2 * steps {
             let rate = if k < steps { 0.2 } else { -0.2 } / f64::from(steps);
             density *= (1.0 - 0.5 * rate) / (1.0 + 0.5 * rate);
-            stress = law.stress(stress, Sym::isotropic(rate / 3.0), &mut history);
+            stress =
+                law.stress(stress, &Increment { strain: Sym::isotropic(rate / 3.0), density, dt: 1.0 }, &mut history);
             stress = sph_run::material::gated(stress, density, gate);
             if density < 0.97 * 2600.0 {
                 highest_open = highest_open.max(-stress.trace() / 3.0);

@@ -142,6 +142,7 @@ impl Job for Check<'_> {
                 mine.mass.push(1.0 + n as f64);
                 mine.density.push(2600.0);
                 mine.history.push(Default::default());
+                mine.work.push(Default::default());
                 mine.body.push(0);
             }
         }

@@ -6,8 +6,10 @@ use sph_run::algebra::{Matrix, Sym, Vector};
 use sph_run::neighbors::Neighbors;
 use sph_run::particles::{Particles, key};
 use sph_run::physics::{CubicSpline, Kernel, WendlandC2};
+use sph_run::rates::momentum::{Viscosity, momentum};
+use sph_run::rates::velocity_gradient::velocity_gradient;
 use sph_run::space::{Axisymmetric, PlaneStrain, Space, ThreeD};
-use sph_run::sweep::{self, Pairs};
+use sph_run::sweep::Pairs;
 
 /// Numbers in [-1, 1), the same on every machine.
 struct Random(u64);
@@ -38,6 +40,7 @@ fn block<const D: usize, const N: usize, S: Space<D, N>>(side: usize, jitter: f6
         p.mass.push(S::volume(1.0, 1.0, place, 1.0).recip() * p.density[k]);
         p.a.push(Vector::default());
         p.history.push(Default::default());
+        p.work.push(Default::default());
         p.body.push(0);
     }
     let count = p.key.len();
@@ -60,12 +63,14 @@ fn sweep_all<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
 ) -> Swept<D> {
     let mut neighbors = Neighbors::default();
     neighbors.build(p, 2.1 * h);
-    let pairs = Pairs { h, spacing: 1.0, viscosity };
+    let pairs = Pairs { h, spacing: 1.0 };
+    let viscosity = Viscosity { strength: viscosity, below: 0.0 };
     let mut gradient = vec![Matrix::default(); p.owned];
-    sweep::velocity_gradient::<D, N, K>(p, &neighbors, pairs, &mut gradient);
+    velocity_gradient::<D, N, K>(p, &neighbors, pairs, &mut gradient);
     let weighted: Vec<_> = p.stress.iter().zip(&p.x).map(|(&s, &x)| s * S::metric(x, 1.0)).collect();
     let mut acceleration = vec![Vector::default(); p.owned];
-    sweep::momentum::<D, N, S, K>(p, &neighbors, pairs, &weighted, &mut acceleration);
+    let mut heat = vec![0.0; p.owned];
+    momentum::<D, N, S, K, _>(p, &neighbors, pairs, viscosity, &weighted, &mut acceleration, &mut heat);
     Swept { gradient, acceleration }
 }
 

@@ -5,7 +5,7 @@
 use formats::h5::Communicator;
 use formats::scene::{Material as Law, Scene};
 use formats::snapshot::Rows;
-use sph_run::material::{DruckerPrager, Material};
+use sph_run::material::DruckerPrager;
 use sph_run::particles::Particles;
 use sph_run::physics::{CubicSpline, Kernel, Model, Physics, WendlandC2};
 use sph_run::simulation::{Clock, Simulation};
@@ -41,16 +41,16 @@ fn growth<const D: usize, const N: usize, P: Physics<D, N, Material = DruckerPra
     let (count, material) = (particles.owned as u64, DruckerPrager::new(law));
     let mut run = Simulation::<D, N, P>::new(comm, &scene, material, particles, count, Clock::default());
     run.parameters.courant = courant;
-    run.accelerate();
-    let start = energy(&run);
+    run.begin();
+    let start = energy(&run, &scene.material);
     for _ in 0..STEPS {
         let plan = run.plan(f64::INFINITY, Requests::default()).expect("a sound state");
         run.step(&plan);
-        if energy(&run) > 1e6 * start {
+        if energy(&run, &scene.material) > 1e6 * start {
             return f64::INFINITY;
         }
     }
-    energy(&run) / start
+    energy(&run, &scene.material) / start
 }
 
 /// A block of `side`^D lattice places with velocities far below the speed of sound, the same on every machine.
@@ -80,10 +80,11 @@ fn block<const D: usize, const N: usize, S: Space<D, N>>(side: usize) -> Rows {
 }
 
 /// Kinetic and elastic energy, J.
-fn energy<const D: usize, const N: usize, P: Physics<D, N>>(run: &Simulation<D, N, P>) -> f64 {
+fn energy<const D: usize, const N: usize, P: Physics<D, N>>(run: &Simulation<D, N, P>, law: &Law) -> f64 {
     let p = &run.particles;
     let of = |i: usize| {
-        0.5 * p.mass[i] * p.v[i].norm2() + p.mass[i] / p.density[i] * run.material.elastic_energy(p.stress[i])
+        0.5 * p.mass[i] * p.v[i].norm2()
+            + p.mass[i] * law.stored_energy(P::Space::stress_to_disk(p.stress[i]), p.density[i])
     };
     (0..p.owned).map(of).sum()
 }

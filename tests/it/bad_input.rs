@@ -71,6 +71,8 @@ const SCENES: &[(&str, &str, &str)] = &[
     ("[end]", "[initial]\njitter = 0.5\n[end]", "jitter"),
     ("[end]", "[initial]\nseed = -1\n[end]", "seed"),
     ("[end]", "[numerics]\ncourant = 0\n[end]", "courant"),
+    ("[end]", "[numerics]\nshifting = 2\n[end]", "shifting"),
+    ("[end]", "[initial]\nstress = \"pressure\"\npressure = \"-1 Pa\"\n[end]", "0 or greater"),
     ("[end]", "[output]\nsnapshots = \"2 ms\"\n[end]", "end.time"),
     // Unknown or missing.
     ("spacing =", "spcing = 1\nspacing =", "spcing"),
@@ -84,6 +86,25 @@ const SCENES: &[(&str, &str, &str)] = &[
     (r#"title = "sound""#, r#"gravity = [0, "1 m/s2", 0]"#, "gravity"),
     (r#"axis = "z""#, r#"axis = "y""#, "normal to y"),
     ("[end]", "[initial]\nk0 = 0.4\n[end]", "k0"),
+    ("[end]", "[initial]\nstress = \"pressure\"\n[end]", "missing"),
+    ("[end]", "[initial]\nlattice = \"body-centred\"\n[end]", "three dimensions"),
+    ("[end]", "[material.mu-i]\nviscosity = 1\n[end]", "exactly one is needed"),
+    ("[end]", "[periodic]\nx = { from = 0, to = \"0.105 m\" }\n[end]", "whole number of spacings"),
+    ("[end]", "[periodic]\nx = { from = 0, to = \"0.09 m\" }\n[end]", "out of the period"),
+    (
+        "[end]",
+        "[periodic]\nx = { from = 0, to = 0.1 }\n[wall.side]\naxis = \"x\"\nat = 0\nside = \"above\"\nslip = \"no-slip\"\n[end]",
+        "repeats itself",
+    ),
+    (
+        "[end]",
+        "[wall.lid]\naxis = \"z\"\nat = \"0.02 m\"\nside = \"below\"\nslip = \"no-slip\"\nkind = \"mirror\"\n[end]",
+        "2.2 h",
+    ),
+    ("[end]", "[numerics]\ndamping = \"1 1/s\"\n[end]", "damps a flow"),
+    ("[end]", "[numerics]\nviscous-courant = 0.1\n[end]", "only with a viscosity"),
+    (r#"slip = "no-slip""#, "slip = \"no-slip\"\nvelocity = [0, 0, 1]", "slides along itself"),
+    (r#"slip = "no-slip""#, "slip = \"free-slip\"\nvelocity = [1, 0, 0]", "takes nothing along"),
     ("[wall.floor]", "cylinder = { radius = 1, height = 1 }\n[wall.floor]", "shape"),
     ("box = { min = [0, 0, 0]", "box = { min = [0, 0, -0.1]", "floor"),
     ("[wall.floor]", "[body.twin]\nbox = { min = [0, 0, 0], max = [0.1, 0, 0.1] }\n[wall.floor]", "overlaps"),
@@ -385,6 +406,22 @@ fn particles_that_cannot_be_read() {
         fs::write(f.initial(), &bytes[..bytes.len() / 2]).unwrap();
     };
     damaged("cut off", cut, exit::NO_INPUT, initial);
+    // Of the version before: it lacks fields, but is not called damaged.
+    let age = |f: &RunFolder| {
+        let file = hdf5::File::open_rw(f.initial()).unwrap();
+        file.group("sph").unwrap().attr("format_version").unwrap().write_scalar(&1u64).unwrap();
+        file.unlink("particles/stress_work").unwrap();
+        file.close().unwrap();
+    };
+    for program in ["sph-run", "sph-post"] {
+        damaged_in(
+            program,
+            "older",
+            age,
+            exit::NO_INPUT,
+            "format version 1, this program reads 2; prepare the scene anew",
+        );
+    }
 }
 
 #[test]

@@ -312,7 +312,8 @@ fn stopped_on_request() {
 /// A run that ends at rest ends there also when it was killed before it was marked as done.
 #[test]
 fn at_rest() {
-    let damped = RINGS.replace("[end]", "[numerics]\ndamping = \"20 1/s\"\n[end]\nat-rest = 0.5");
+    let damped =
+        RINGS.replace("[end]", "[numerics]\ndamping = \"20 1/s\"\ndamping-in-flow = \"forced\"\n[end]\nat-rest = 0.5");
     let work = WorkFolder::new();
     let reference = tests::computed(&work, "one", &scene(&damped), 1);
     let history = fs::read_to_string(reference.history()).unwrap();

@@ -2,14 +2,13 @@
 //! What concerns places (bodies, walls, planes of symmetry) is in [`super::geometry`].
 
 use super::{
-    End, Initial, InitialStress, Lattice, Material, Output, Scene, SceneError, geometry, material, numerics,
-    raw::{Allowed, Faults, NOT_NEGATIVE, POSITIVE, Table, values},
+    End, Output, Scene, SceneError, geometry, held, initial, material, numerics, period,
+    raw::{Allowed, Faults, POSITIVE, Table, values},
 };
 use crate::{kernel::Kernel, space::Space, units::Dimension};
 use toml::de::DeTable;
 
 const H_OVER_DX: Allowed = Allowed { says: "in [1, 3]", holds: |v| (1.0..=3.0).contains(&v) };
-const JITTER: Allowed = Allowed { says: "in [0, 0.5), a fraction of the spacing", holds: |v| (0.0..0.5).contains(&v) };
 const AT_REST: Allowed =
     Allowed { says: "in (0, 1), a fraction of the peak kinetic energy", holds: |v| v > 0.0 && v < 1.0 };
 
@@ -20,6 +19,8 @@ const STANDARD_GRAVITY: f64 = 9.81;
 pub(super) struct Setting {
     pub space: Option<Space>,
     pub spacing: Option<f64>,
+    /// Smoothing length over spacing.
+    pub h_over_dx: f64,
     pub gravity: Option<[f64; 3]>,
     pub symmetry: [bool; 2],
     pub periodic: [Option<[f64; 2]>; 3],
@@ -49,9 +50,10 @@ fn read(root: Table<'_>) -> Option<Scene> {
     let title = title(&root);
     let material = material::read(&root);
     let (bodies, walls) = geometry::read(&root, &setting);
-    let initial = initial(&root, &setting, material.as_ref());
-    let place =
-        numerics::Place { space: setting.space, kernel, h_over_dx, held: geometry::held(&bodies, &walls, &setting) };
+    let initial = initial::read(&root, &setting, material.as_ref());
+    // With a fault in a body or a wall nothing certain can be said.
+    let flow = bodies.as_ref().zip(walls.as_ref()).and_then(|(b, w)| held::what_flows(b, w, &setting));
+    let place = numerics::Place { space: setting.space, kernel, h_over_dx, flow };
     let numerics = numerics::read(&root, place, material.as_ref());
     let end = end(&root);
     let output = output(&root, end.as_ref());
@@ -83,52 +85,8 @@ fn setting(root: &Table<'_>, h_over_dx: f64) -> Setting {
     let spacing = root.needed("spacing", Dimension::Length, &POSITIVE).map(|found| found.value);
     let gravity = gravity(root, space);
     let symmetry = symmetry(root, space, gravity);
-    let periodic = periodic(root, space, spacing, symmetry, h_over_dx);
-    Setting { space, spacing, gravity, symmetry, periodic }
-}
-
-/// Support of the kernel with the skin of the neighbour lists, in smoothing lengths: a particle and its copy one period
-/// away must never both be in reach of a third.
-const REACH: f64 = 2.2;
-
-fn periodic(
-    root: &Table<'_>,
-    space: Option<Space>,
-    spacing: Option<f64>,
-    symmetry: [bool; 2],
-    h_over_dx: f64,
-) -> [Option<[f64; 2]>; 3] {
-    let table = root.child("periodic");
-    let mut periods = [None; 3];
-    for (axis, key) in ["x", "y"].into_iter().enumerate() {
-        let ends = table.child(key);
-        if !ends.is_there() {
-            continue;
-        }
-        let from = ends.needed("from", Dimension::Length, &super::raw::ANY);
-        let to = ends.needed("to", Dimension::Length, &super::raw::ANY);
-        let fault = |message: String| ends.faults.add(ends.offset, &ends.path, message);
-        match space {
-            Some(Space::Axisymmetric) => fault("the space \"axisymmetric\" has no periodic axis".into()),
-            Some(Space::PlaneStrain) if axis == 1 => fault("the space \"plane-strain\" has no y axis".into()),
-            _ if symmetry[axis] => fault(format!("{key} = 0 is a plane of symmetry; drop that, or this")),
-            _ => {}
-        }
-        if let (Some(from), Some(to), Some(dx)) = (&from, &to, spacing) {
-            let cells = (to.value - from.value) / dx;
-            let least = 2.0 * REACH * h_over_dx;
-            if cells <= least {
-                ends.faults.at(to, format!("the period is {cells} spacings; it must be more than {least:.2}"));
-            } else if (cells - cells.round()).abs() > 1e-6 {
-                ends.faults.at(to, format!("the period must be a whole number of spacings; it is {cells} of {dx} m"));
-            } else {
-                periods[axis] = Some([from.value, to.value]);
-            }
-        }
-        ends.finish();
-    }
-    table.finish();
-    periods
+    let periodic = period::read(root, space, spacing, symmetry, h_over_dx);
+    Setting { space, spacing, h_over_dx, gravity, symmetry, periodic }
 }
 
 fn title(root: &Table<'_>) -> Option<String> {
@@ -206,79 +164,6 @@ fn kernel(root: &Table<'_>) -> (Kernel, f64) {
     let ratio = table.number("h-over-dx", Dimension::Number, &H_OVER_DX);
     table.finish();
     (kind, ratio.map_or(kind.default_h_over_dx(), |found| found.value))
-}
-
-/// Largest number of passes of relaxation.
-const MOST_PASSES: u64 = 10_000;
-
-fn initial(root: &Table<'_>, setting: &Setting, material: Option<&Material>) -> Option<Initial> {
-    #[derive(Clone, Copy, PartialEq)]
-    enum Kind {
-        Zero,
-        Pressure,
-        Hydrostatic,
-        K0,
-    }
-    let table = root.child("initial");
-    let kinds =
-        [("zero", Kind::Zero), ("pressure", Kind::Pressure), ("hydrostatic", Kind::Hydrostatic), ("k0", Kind::K0)];
-    let kind = table.choice("stress", &kinds);
-    let pressure = table.number("pressure", Dimension::Stress, &NOT_NEGATIVE);
-    let lattices =
-        [("cubic", Lattice::Cubic), ("hexagonal", Lattice::Hexagonal), ("body-centred", Lattice::BodyCentred)];
-    let lattice = table.choice("lattice", &lattices);
-    if let (Some(lattice), Some(Space::PlaneStrain | Space::Axisymmetric)) = (&lattice, setting.space)
-        && lattice.value == Lattice::BodyCentred
-    {
-        table.faults.at(lattice, "\"body-centred\" needs three dimensions; in a plane use \"hexagonal\"");
-    }
-    let k0 = table.number("k0", Dimension::Number, &NOT_NEGATIVE);
-    let jitter = table.number("jitter", Dimension::Number, &JITTER);
-    let seed = table.count("seed");
-    let relax = table.count("relax");
-    if let Some(relax) = relax.as_ref().filter(|relax| relax.value > MOST_PASSES) {
-        let source = table.faults.source(relax);
-        table.faults.at(relax, format!("{source} is out of range; it must be from 0 to {MOST_PASSES}"));
-    }
-    if let (Some(k0), true) = (&k0, kind.as_ref().map_or(!table.has("stress"), |kind| kind.value != Kind::K0)) {
-        table.faults.at(k0, "is used only with stress = \"k0\"; set that, or drop this key");
-    }
-    let wants_pressure = kind.as_ref().is_some_and(|kind| kind.value == Kind::Pressure);
-    match (&pressure, wants_pressure) {
-        (Some(pressure), false) if kind.is_some() || !table.has("stress") => {
-            table.faults.at(pressure, "is used only with stress = \"pressure\"; set that, or drop this key");
-        }
-        (None, true) if !table.has("pressure") => {
-            let message = "missing; a stress such as \"600 Pa\" is needed with stress = \"pressure\"";
-            table.faults.structure(table.offset, &table.path_of("pressure"), message);
-        }
-        _ => {}
-    }
-    if let (Some(kind), Some(gravity)) = (&kind, setting.gravity)
-        && matches!(kind.value, Kind::Hydrostatic | Kind::K0)
-        && gravity[2] >= 0.0
-    {
-        let message = "needs gravity along -z: there is no weight to carry; use \"zero\", or give gravity";
-        table.faults.at(kind, format!("{} {message}", table.faults.source(kind)));
-    }
-    table.finish();
-    let stress = match kind.map_or(Kind::Zero, |found| found.value) {
-        Kind::Zero => InitialStress::Zero,
-        Kind::Hydrostatic => InitialStress::Hydrostatic,
-        Kind::Pressure => InitialStress::Pressure(pressure?.value),
-        Kind::K0 => {
-            // A fluid has no sideways stress of its own: only the pressure.
-            let elastic = match material? {
-                Material::DruckerPrager(law) => law.poisson / (1.0 - law.poisson),
-                Material::MuI(_) | Material::ViscoPlastic(_) => 1.0,
-            };
-            InitialStress::K0 { coefficient: k0.map_or(elastic, |found| found.value) }
-        }
-    };
-    let jitter = jitter.map_or(0.0, |found| found.value);
-    let lattice = lattice.map_or(Lattice::Cubic, |found| found.value);
-    let (seed, relax) = (seed.map_or(1, |found| found.value), relax.map_or(0, |found| found.value));
-    Some(Initial { stress, lattice, jitter, seed, relax })
 }
 
 fn end(root: &Table<'_>) -> Option<End> {

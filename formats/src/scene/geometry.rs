@@ -1,38 +1,29 @@
-//! Bodies and walls of a scene: reads them, and checks that they fit the space, the lattice, the planes of symmetry
-//! and each other.
+//! Bodies and walls of a scene. Whether they fit the lattice and each other is checked in [`super::fit`].
 
 use super::{
     Body, Shape, Slip, Wall, WallKind,
     check::{AXES, Setting},
-    raw::{Faults, Found, POSITIVE, Table, values},
+    fit::Fit,
+    raw::{ANY, Found, POSITIVE, Table, values},
 };
 use crate::{space::Space, units::Dimension};
 
-/// Lengths that differ by less than this fraction of the spacing are equal.
-const TOLERANCE: f64 = 1e-6;
-/// Points closer than this to a border, in spacings, lie on it and hold no particle.
-const ON_THE_BORDER: f64 = 1e-9;
-/// Lattice coordinates are kept in 21 bits with sign.
-const MOST_CELLS_PER_AXIS: f64 = (1u64 << 20) as f64;
-/// Largest number of lattice cells of all bodies together.
-const MOST_CELLS: f64 = (1u64 << 40) as f64;
-
 /// A body and the place of its shape in the file.
-struct PlacedBody {
-    body: Body,
-    offset: usize,
-    key: String,
+pub(super) struct PlacedBody {
+    pub body: Body,
+    pub offset: usize,
+    pub key: String,
 }
 
-/// A wall and what was read for it.
-struct PlacedWall {
-    name: String,
-    axis: Found<usize>,
-    at: Found<f64>,
-    side: Found<f64>,
-    slip: Found<Slip>,
-    kind: WallKind,
-    velocity: [f64; 3],
+/// A wall and the places of what was read for it.
+pub(super) struct PlacedWall {
+    pub name: String,
+    pub axis: Found<usize>,
+    pub at: Found<f64>,
+    pub side: Found<f64>,
+    pub slip: Slip,
+    pub kind: WallKind,
+    pub velocity: [f64; 3],
 }
 
 /// All bodies and all walls; None where one has a fault.
@@ -51,16 +42,15 @@ pub(super) fn read(root: &Table<'_>, setting: &Setting) -> (Option<Vec<Body>>, O
     let known_walls: Vec<_> = walls.iter().flatten().collect();
     // With the space or the spacing unknown, or lines lost, nothing certain can be said about places.
     if let (Some(space), Some(spacing), false) = (setting.space, setting.spacing, faults.broken()) {
-        let fit = Fit { faults, space, spacing, symmetry: setting.symmetry };
+        let fit = Fit { faults, space, spacing, setting };
         let right_walls = fit.walls(&known_walls);
         fit.bodies(&known_bodies, &right_walls);
     }
-    let walls = walls.iter().map(|wall| {
-        let PlacedWall { axis, at, side, slip, kind, velocity, .. } = wall.as_ref()?;
-        let (kind, velocity) = (*kind, *velocity);
-        Some(Wall { axis: axis.value, at: at.value, side: side.value, slip: slip.value, kind, velocity })
-    });
-    let walls = walls.collect();
+    let wall = |placed: PlacedWall| {
+        let PlacedWall { axis, at, side, slip, kind, velocity, .. } = placed;
+        Wall { axis: axis.value, at: at.value, side: side.value, slip, kind, velocity }
+    };
+    let walls = walls.into_iter().map(|placed| placed.map(wall)).collect();
     (bodies.into_iter().map(|placed| placed.map(|placed| placed.body)).collect(), walls)
 }
 
@@ -183,306 +173,75 @@ fn is_3d(setting: &Setting) -> bool {
 
 fn wall(name: String, table: Table<'_>, setting: &Setting) -> Option<PlacedWall> {
     let axis = table.needed_choice("axis", &[("x", 0), ("y", 1), ("z", 2)]);
-    let at = table.needed("at", Dimension::Length, &super::raw::ANY);
+    let at = table.needed("at", Dimension::Length, &ANY);
     let side = table.needed_choice("side", &[("above", 1.0), ("below", -1.0)]);
     let slip = table.needed_choice("slip", &[("no-slip", Slip::NoSlip), ("free-slip", Slip::FreeSlip)]);
-    let mut right = true;
-    if let (Some(axis), Some(space)) = (&axis, setting.space)
-        && !space.axes().contains(&axis.value)
-    {
-        let message = format!("there are no walls normal to y in the space \"{}\"; valid: \"x\", \"z\"", space.name());
-        table.faults.at(axis, message);
-        right = false;
-    }
     let kind = table.choice("kind", &[("virtual", WallKind::Virtual), ("mirror", WallKind::Mirror)]);
     let velocity = table.vector("velocity", Dimension::Velocity);
-    if let (Some(velocity), Some(axis)) = (&velocity, &axis) {
-        let still = |a: usize| match setting.space {
-            Some(Space::Axisymmetric) => a != 2,
-            Some(Space::PlaneStrain) => a == 1,
-            _ => false,
-        };
-        for a in (0..3).filter(|&a| (a == axis.value || still(a)) && velocity[a].value != 0.0) {
-            faults_of_motion(&table, &velocity[a], a, axis.value);
-            right = false;
-        }
-        if slip.as_ref().is_some_and(|slip| slip.value == Slip::FreeSlip) && velocity.iter().any(|v| v.value != 0.0) {
-            table
-                .faults
-                .at(&velocity[0], "a free-slip wall moves nothing; set slip = \"no-slip\", or drop the velocity");
-            right = false;
-        }
+    let mut right = true;
+    if let Some(axis) = &axis
+        && let Some(message) = no_walls_along(axis.value, setting)
+    {
+        table.faults.at(axis, message);
+        right = false;
+    } else if let (Some(velocity), Some(axis), Some(slip)) = (&velocity, &axis, &slip)
+        && let Some((component, message)) = motion_fault(velocity, axis.value, slip.value, setting)
+    {
+        table.faults.at(component, message);
+        right = false;
     }
     table.finish();
-    let velocity = velocity.as_ref().map_or([0.0; 3], values);
     let kind = kind.map_or(WallKind::Virtual, |found| found.value);
-    let wall = PlacedWall { name, axis: axis?, at: at?, side: side?, slip: slip?, kind, velocity };
+    let velocity = velocity.as_ref().map_or([0.0; 3], values);
+    let wall = PlacedWall { name, axis: axis?, at: at?, side: side?, slip: slip?.value, kind, velocity };
     right.then_some(wall)
 }
 
-fn faults_of_motion(table: &Table<'_>, component: &Found<f64>, along: usize, normal: usize) {
-    let name = AXES[along];
-    let message = match along == normal {
-        true => format!("a wall normal to {name} slides along itself: its velocity along {name} must be 0"),
-        false => format!("the velocity of this wall along {name} must be 0 in this space"),
-    };
-    table.faults.at(component, message);
+/// Why no wall can be normal to an axis, where none can.
+fn no_walls_along(axis: usize, setting: &Setting) -> Option<String> {
+    let name = AXES[axis];
+    match setting.space {
+        Some(space) if !space.axes().contains(&axis) => {
+            let valid = "valid: \"x\", \"z\"";
+            Some(format!("there are no walls normal to {name} in the space \"{}\"; {valid}", space.name()))
+        }
+        _ if setting.periodic[axis].is_some() => {
+            let message = format!("the scene repeats itself along {name}: no wall can be normal to it");
+            Some(format!("{message}; drop this wall, or periodic.{name}"))
+        }
+        _ => None,
+    }
 }
 
-/// Is the material held on every side: by a wall, a plane of symmetry, the axis, or a period, at most a spacing away?
-pub(super) fn held(bodies: &Option<Vec<Body>>, walls: &Option<Vec<Wall>>, setting: &Setting) -> bool {
-    let (Some(bodies), Some(walls), Some(space), Some(dx)) = (bodies, walls, setting.space, setting.spacing) else {
-        // Other faults come first.
-        return true;
-    };
-    space.axes().iter().filter(|&&axis| axis != 2).all(|&axis| {
-        let low = bodies.iter().map(|body| bounds(&body.shape, space).0[axis]).fold(f64::INFINITY, f64::min);
-        let high = bodies.iter().map(|body| bounds(&body.shape, space).1[axis]).fold(f64::NEG_INFINITY, f64::max);
-        let wall = |side: f64, end: f64| {
-            walls.iter().any(|wall| wall.axis == axis && wall.side == side && side * (end - wall.at) <= dx)
+/// The component of a wall's velocity that cannot be, and why: a wall slides along itself, and takes along what sticks
+/// to it, the same everywhere on it.
+fn motion_fault<'v>(
+    velocity: &'v [Found<f64>; 3],
+    normal: usize,
+    slip: Slip,
+    setting: &Setting,
+) -> Option<(&'v Found<f64>, String)> {
+    (0..3).filter(|&along| velocity[along].value != 0.0).find_map(|along| {
+        let name = AXES[along];
+        let is_out_of_plane = match setting.space {
+            Some(Space::PlaneStrain) => along == 1,
+            Some(Space::Axisymmetric) => along != 2,
+            Some(Space::ThreeD) | None => false,
         };
-        let mirrored = (axis == 0 && space == Space::Axisymmetric) || (axis < 2 && setting.symmetry[axis]);
-        let period = setting.periodic[axis].is_some();
-        period || ((wall(1.0, low) || (mirrored && low <= dx)) && wall(-1.0, high))
+        let message = if is_out_of_plane {
+            let space = setting.space.map_or("", Space::name);
+            format!("velocity of a wall along {name} must be 0 in the space \"{space}\"")
+        } else if along == normal {
+            format!("a wall normal to {name} slides along itself: its velocity along {name} must be 0")
+        } else if along < 2 && setting.symmetry[along] {
+            format!("this wall crosses the plane of symmetry {name} = 0: its velocity along {name} must be 0")
+        } else if slip == Slip::FreeSlip {
+            "a free-slip wall takes nothing along; set slip = \"no-slip\", or drop the velocity".to_string()
+        } else {
+            return None;
+        };
+        Some((&velocity[along], message))
     })
-}
-
-/// What bodies and walls must fit.
-struct Fit<'a> {
-    faults: &'a Faults<'a>,
-    space: Space,
-    spacing: f64,
-    symmetry: [bool; 2],
-}
-
-impl Fit<'_> {
-    fn is_symmetric(&self, axis: usize) -> bool {
-        axis < 2 && self.symmetry[axis]
-    }
-
-    fn is_whole(&self, length: f64) -> bool {
-        let cells = length / self.spacing;
-        // Of a far place, the last bits of a float are larger than the tolerance.
-        (cells - cells.round()).abs() <= TOLERANCE.max(4.0 * f64::EPSILON * cells.abs())
-    }
-
-    /// Checks the walls, and returns those without fault.
-    fn walls<'w>(&self, walls: &[&'w PlacedWall]) -> Vec<&'w PlacedWall> {
-        let alone = |wall: &PlacedWall| match self.wall_alone(wall) {
-            Some(message) => {
-                self.faults.at(&wall.at, message);
-                false
-            }
-            None => true,
-        };
-        let mut right: Vec<&PlacedWall> = Vec::new();
-        for &wall in walls {
-            let mut fits = alone(wall);
-            for other in right.iter().filter(|other| other.axis.value == wall.axis.value) {
-                if other.side.value == wall.side.value {
-                    let message = "is on the same axis and side as that of wall";
-                    let advice = "only one of them can hold material";
-                    self.faults.at(&wall.side, format!("{message} `{}`; {advice}", other.name));
-                    fits = false;
-                } else if let Some(message) = self.wall_facing(wall, other) {
-                    self.faults.at(&wall.at, message);
-                    fits = false;
-                }
-            }
-            if fits {
-                right.push(wall);
-            }
-        }
-        right
-    }
-
-    fn wall_alone(&self, wall: &PlacedWall) -> Option<String> {
-        let (axis, at, dx) = (wall.axis.value, wall.at.value, self.spacing);
-        if axis == 0 && self.space == Space::Axisymmetric && at <= 0.0 {
-            let message = "a wall normal to x is a cylinder in the space \"axisymmetric\"";
-            return Some(format!("{message}: its radius must be greater than 0"));
-        }
-        if self.is_symmetric(axis) && at <= 0.0 {
-            let message = "must be greater than 0: the material lies on the positive side of the plane of symmetry";
-            return Some(format!("{message} {} = 0", AXES[axis]));
-        }
-        let message = "must be a whole number of spacings from the plane of symmetry";
-        (self.is_symmetric(axis) && !self.is_whole(at))
-            .then(|| format!("{message} {} = 0; it is {} of {dx} m", AXES[axis], at / dx))
-    }
-
-    fn wall_facing(&self, wall: &PlacedWall, other: &PlacedWall) -> Option<String> {
-        let (name, dx) = (&other.name, self.spacing);
-        let room = wall.side.value * (other.at.value - wall.at.value);
-        if room <= 0.0 {
-            let message = format!("leaves no room between this wall and wall `{name}`, which faces it");
-            return Some(format!("{message}; the wall with side = \"above\" must be the lower one"));
-        }
-        let message = format!("must be a whole number of spacings from wall `{name}`, which faces it");
-        (!self.is_whole(room)).then(|| format!("{message}; it is {} of {dx} m", room / dx))
-    }
-
-    fn bodies(&self, bodies: &[&PlacedBody], walls: &[&PlacedWall]) {
-        let mut total = 0.0;
-        for (i, placed) in bodies.iter().enumerate() {
-            let fault = |message: String| self.faults.add(placed.offset, &placed.key, message);
-            let shape = &placed.body.shape;
-            let (mut low, high) = bounds(shape, self.space);
-            let mut outside = false;
-            for axis in (0..2).filter(|&axis| self.is_symmetric(axis)) {
-                if high[axis] <= TOLERANCE * self.spacing {
-                    let name = AXES[axis];
-                    fault(format!(
-                        "lies on the negative side of the plane of symmetry {name} = 0; nothing of it is kept"
-                    ));
-                    outside = true;
-                }
-                low[axis] = low[axis].max(0.0);
-            }
-            if outside {
-                continue;
-            }
-            if let Some(reason) = self.emptiness(shape) {
-                fault(reason);
-                continue;
-            }
-            total += self.extent(low, high, walls, &fault);
-            self.behind_walls(low, high, walls, &fault);
-            for other in bodies[..i].iter().filter(|other| self.overlap(shape, &other.body.shape)) {
-                fault(format!("overlaps body `{}`; bodies may touch, but not overlap", other.body.name));
-            }
-        }
-        if let (true, Some(last)) = (total >= MOST_CELLS, bodies.last()) {
-            let message = format!("the bodies have {total:.3e} lattice cells, with spacing {} m", self.spacing);
-            self.faults.add(last.offset, &last.key, format!("{message}; there must be fewer than 2^40"));
-        }
-    }
-
-    /// Number of lattice cells within bounds; a fault where they are too far from the origin of the lattice.
-    fn extent(&self, low: [f64; 3], high: [f64; 3], walls: &[&PlacedWall], fault: &dyn Fn(String)) -> f64 {
-        let mut cells = 1.0;
-        for &axis in self.space.axes() {
-            let wall = walls.iter().find(|wall| wall.axis.value == axis && !self.is_symmetric(axis));
-            let origin = wall.map_or(0.0, |wall| wall.at.value);
-            let furthest = (low[axis] - origin).abs().max((high[axis] - origin).abs()) / self.spacing;
-            if furthest >= MOST_CELLS_PER_AXIS {
-                let message =
-                    format!("reaches {furthest:.3e} spacings from the origin of the lattice along {}", AXES[axis]);
-                fault(format!("{message}; it must be fewer than 2^20"));
-            }
-            cells *= ((high[axis] - low[axis]) / self.spacing).round().max(1.0);
-        }
-        cells
-    }
-
-    fn behind_walls(&self, low: [f64; 3], high: [f64; 3], walls: &[&PlacedWall], fault: &dyn Fn(String)) {
-        for wall in walls {
-            let (axis, at) = (wall.axis.value, wall.at.value);
-            let nearest = if wall.side.value > 0.0 { low[axis] } else { high[axis] };
-            let depth = wall.side.value * (at - nearest);
-            if depth > TOLERANCE * self.spacing {
-                let (name, plane) = (&wall.name, format!("{} = {at} m", AXES[axis]));
-                fault(format!("reaches {depth} m behind wall `{name}`, the plane {plane}; it must end there"));
-            }
-        }
-    }
-
-    /// Why a shape holds no particle, if it holds none.
-    fn emptiness(&self, shape: &Shape) -> Option<String> {
-        let dx = self.spacing;
-        let (low, high) = bounds(shape, self.space);
-        let is_round = |axis: usize| axis < 2 && matches!(shape, Shape::Cylinder { .. });
-        for &axis in self.space.axes().iter().filter(|&&axis| !is_round(axis)) {
-            let size = high[axis] - low[axis];
-            if (size / dx).round() < 1.0 {
-                let name = AXES[axis];
-                let message =
-                    format!("holds no particle: its size along {name} is {size} m, less than half the spacing");
-                return Some(format!("{message} of {dx} m"));
-            }
-        }
-        // The lattice point, counted in half cells from the shape's thick part, that lies deepest in the shape among
-        // those on the positive side of the planes of symmetry.
-        let first = |axis: usize, start: f64| {
-            let cells = if self.is_symmetric(axis) { (ON_THE_BORDER - start / dx - 0.5).floor() + 1.0 } else { 0.0 };
-            cells.max(0.0) + 0.5
-        };
-        let last_is_kept = |axis: usize| {
-            let cells = ((high[axis] - low[axis]) / dx).round();
-            !self.is_symmetric(axis) || low[axis] / dx + cells - 0.5 > ON_THE_BORDER
-        };
-        let (holds, size) = match *shape {
-            Shape::Cylinder { radius, .. } if self.space == Space::Axisymmetric => {
-                (0.5 < radius / dx - ON_THE_BORDER, format!("radius {radius} m"))
-            }
-            Shape::Cylinder { base, radius, .. } => {
-                let distance = first(0, base[0]).hypot(first(1, base[1]));
-                (distance < radius / dx - ON_THE_BORDER, format!("radius {radius} m"))
-            }
-            Shape::Box { .. } => {
-                (last_is_kept(0) && last_is_kept(1), format!("size {} m x {} m", high[0] - low[0], high[2] - low[2]))
-            }
-            Shape::Wedge { corner, size, falls_left } => {
-                let column = if falls_left { 0.5 } else { first(0, corner[0]) };
-                let kept = !falls_left || !self.is_symmetric(0) || corner[0] / dx - 0.5 > ON_THE_BORDER;
-                let under_slope = size[2] / dx * (1.0 - column * dx / size[0]) - 0.5 > ON_THE_BORDER;
-                (kept && under_slope && last_is_kept(1), format!("size {} m x {} m", size[0], size[2]))
-            }
-        };
-        let kept = if self.symmetry.contains(&true) { " on the positive side of the planes of symmetry" } else { "" };
-        (!holds).then(|| format!("holds no particle{kept}: {size} is too small for the spacing of {dx} m"))
-    }
-
-    /// Do two shapes share a volume? Exact, because no shape grows with height: they do where they share a span of
-    /// heights and, at its foot, their horizontal sections share an area.
-    fn overlap(&self, a: &Shape, b: &Shape) -> bool {
-        let tolerance = TOLERANCE * self.spacing;
-        let ((low_a, high_a), (low_b, high_b)) = (bounds(a, self.space), bounds(b, self.space));
-        let foot = low_a[2].max(low_b[2]);
-        if high_a[2].min(high_b[2]) - foot <= tolerance {
-            return false;
-        }
-        match (section(a, self.space, foot), section(b, self.space, foot)) {
-            (Section::Disc { centre: p, radius: r }, Section::Disc { centre: q, radius: s }) => {
-                (p[0] - q[0]).hypot(p[1] - q[1]) < r + s - tolerance
-            }
-            (Section::Disc { centre, radius }, Section::Rectangle { low, high })
-            | (Section::Rectangle { low, high }, Section::Disc { centre, radius }) => {
-                let apart = |axis: usize| centre[axis] - centre[axis].clamp(low[axis], high[axis]);
-                apart(0).hypot(apart(1)) < radius - tolerance
-            }
-            (Section::Rectangle { low: l, high: h }, Section::Rectangle { low: m, high: n }) => {
-                let shared = |axis: usize| h[axis].min(n[axis]) - l[axis].max(m[axis]);
-                shared(0) > tolerance && (self.space != Space::ThreeD || shared(1) > tolerance)
-            }
-        }
-    }
-}
-
-/// A horizontal section of a shape.
-enum Section {
-    Disc { centre: [f64; 2], radius: f64 },
-    Rectangle { low: [f64; 2], high: [f64; 2] },
-}
-
-fn section(shape: &Shape, space: Space, z: f64) -> Section {
-    let (low, high) = bounds(shape, space);
-    let (mut low, mut high) = ([low[0], low[1]], [high[0], high[1]]);
-    match *shape {
-        Shape::Cylinder { base, radius, .. } if space == Space::ThreeD => {
-            return Section::Disc { centre: [base[0], base[1]], radius };
-        }
-        Shape::Cylinder { .. } | Shape::Box { .. } => {}
-        Shape::Wedge { corner, size, falls_left } => {
-            let length = size[0] * (1.0 - (z - corner[2]) / size[2]);
-            if falls_left {
-                low[0] = corner[0] - length;
-            } else {
-                high[0] = corner[0] + length;
-            }
-        }
-    }
-    Section::Rectangle { low, high }
 }
 
 /// Lower and upper corner of the box around a shape, m.

@@ -1,6 +1,6 @@
 //! What follows from the parameters of a law alone: its wave speed, its equation of state, the energy it stores.
 
-use super::{Cone, DruckerPrager, Material, MeanStress, Unyielded, ViscoPlastic};
+use super::{Cone, DruckerPrager, Material, MeanStress, MuI, Unyielded, ViscoPlastic};
 
 impl Material {
     /// Density without stress, kg/m3.
@@ -21,6 +21,38 @@ impl Material {
                 Unyielded::Elastic(shear) => (law.sound_speed.powi(2) + 4.0 / 3.0 * shear / law.density).sqrt(),
             },
             Self::ViscoPlastic(law) => law.sound_speed,
+        }
+    }
+
+    /// Is it a fluid: does all stress follow from density and strain rate, and none from the strain of earlier steps?
+    pub fn is_fluid(&self) -> bool {
+        match self {
+            Self::DruckerPrager(_) => false,
+            Self::MuI(law) => matches!(law.unyielded, Unyielded::Cap(_)),
+            Self::ViscoPlastic(_) => true,
+        }
+    }
+
+    /// Does the pressure follow from the density alone, whatever happened before?
+    pub fn ties_pressure_to_density(&self) -> bool {
+        match self {
+            Self::DruckerPrager(law) => law.mean_stress == MeanStress::Density,
+            Self::MuI(_) | Self::ViscoPlastic(_) => true,
+        }
+    }
+
+    /// Horizontal over vertical stress where the elastic material is held on its sides: nu/(1 - nu); 1 of a fluid.
+    pub fn elastic_k0(&self) -> f64 {
+        match self {
+            Self::DruckerPrager(law) => law.poisson / (1.0 - law.poisson),
+            Self::MuI(law) => match law.unyielded {
+                Unyielded::Cap(_) => 1.0,
+                Unyielded::Elastic(shear) => {
+                    let bulk = law.bulk();
+                    (3.0 * bulk - 2.0 * shear) / (3.0 * bulk + 4.0 * shear)
+                }
+            },
+            Self::ViscoPlastic(_) => 1.0,
         }
     }
 
@@ -68,9 +100,32 @@ impl Material {
     }
 }
 
+impl MuI {
+    /// Lower neutral inertial number of the curve mu_s + (mu_2 - mu_s)/(1 + I0/I): below it the incompressible equations are
+    /// ill posed (Barker, Schaeffer, Bohorquez & Gray 2015). With x = I mu'(I)/mu they are well posed where
+    /// 4 x^2 - 4 x + mu^2 (1 - x/2)^2 < 0. None where they are for no I.
+    pub fn neutral_inertial_number(&self) -> Option<f64> {
+        let posed = |ratio: f64| {
+            let rise = (self.friction_dynamic - self.friction_static) * ratio / (1.0 + ratio);
+            let mu = self.friction_static + rise;
+            let x = rise / ((1.0 + ratio) * mu);
+            4.0 * x * x - 4.0 * x + (mu * (1.0 - 0.5 * x)).powi(2) < 0.0
+        };
+        // In steps of a hundredth of a decade of I/I0, then by bisection.
+        let step = |k: i32| 10f64.powf(f64::from(k) / 100.0);
+        let first = (-800..=800).find(|&k| posed(step(k)))?;
+        let (mut low, mut high) = (step(first - 1), step(first));
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if posed(middle) { high = middle } else { low = middle }
+        }
+        Some(high * self.inertial_number)
+    }
+}
+
 impl ViscoPlastic {
     /// c^2 rho0/7, Pa.
-    fn stiffness(&self) -> f64 {
+    pub fn stiffness(&self) -> f64 {
         self.sound_speed.powi(2) * self.density / Self::TAIT_EXPONENT
     }
 
@@ -86,6 +141,13 @@ impl DruckerPrager {
     /// Shear modulus G, Pa.
     pub fn shear(&self) -> f64 {
         self.young / (2.0 * (1.0 + self.poisson))
+    }
+}
+
+impl MuI {
+    /// Bulk modulus rho0 c^2, Pa.
+    pub fn bulk(&self) -> f64 {
+        self.density * self.sound_speed.powi(2)
     }
 }
 

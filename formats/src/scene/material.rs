@@ -127,6 +127,13 @@ fn mu_i(table: Table<'_>) -> Option<MuI> {
     {
         table.faults.at(curve, "\"partially-regularised\" needs friction-dynamic above friction-static");
     }
+    if let (Some(shear), Some(density), Some(c)) = (&shear, &density, &sound_speed) {
+        let most = 1.5 * density.value * c.value * c.value;
+        if shear.value > most {
+            let (source, reason) = (table.faults.source(shear), "Poisson's ratio would be negative");
+            table.faults.at(shear, format!("{source} is above 3/2 rho c^2 = {most} Pa: {reason}; it must not be"));
+        }
+    }
     let elastic = unyielded.as_ref().is_some_and(|kind| kind.value == Kind::Elastic);
     if let (Some(cap), true) = (&cap, elastic) {
         table.faults.at(cap, "is used only with unyielded = \"cap\"; drop this key");
@@ -134,16 +141,25 @@ fn mu_i(table: Table<'_>) -> Option<MuI> {
     if let (Some(shear), false) = (&shear, elastic) {
         table.faults.at(shear, "is used only with unyielded = \"elastic\"; set that, or drop this key");
     }
+    if let (Some(curve), true) = (&curve, elastic)
+        && curve.value == Curve::PartiallyRegularised
+    {
+        let message = "\"partially-regularised\" flows under any shear stress: it goes with unyielded = \"cap\" only";
+        table.faults.at(curve, message);
+    }
     if let (Some(norm), true) = (&norm, elastic)
         && norm.value == Norm::Printed
     {
         table.faults.at(norm, "\"printed\" goes with unyielded = \"cap\" only");
     }
+    let dynamic_place = friction_dynamic.clone();
+    let faults = table.faults;
     table.finish();
     let (density, sound_speed, friction_static) = (density?.value, sound_speed?.value, friction_static?.value);
     // That of a solid whose P waves have the speed c in bulk alone and Poisson's ratio 0.3: G/K = 3/2 (1 - 2 nu)/(1 + nu).
+    let regularised = curve.as_ref().is_some_and(|found| found.value == Curve::PartiallyRegularised);
     let shear = or(shear, 6.0 / 13.0 * density * sound_speed * sound_speed);
-    Some(MuI {
+    let law = MuI {
         density,
         sound_speed,
         friction_static,
@@ -155,7 +171,13 @@ fn mu_i(table: Table<'_>) -> Option<MuI> {
         curve: or(curve, Curve::Jop),
         unyielded: if elastic { Unyielded::Elastic(shear) } else { Unyielded::Cap(cap.map(|found| found.value)) },
         tension: or(tension, false),
-    })
+    };
+    if let (true, None, Some(dynamic)) = (regularised && rates, law.neutral_inertial_number(), &dynamic_place) {
+        let message = "with these friction coefficients the equations are ill posed at any inertial number, so there is \
+                       nothing to join \"partially-regularised\" to; raise friction-dynamic";
+        faults.at(dynamic, message);
+    }
+    Some(law)
 }
 
 fn visco_plastic(table: Table<'_>) -> Option<ViscoPlastic> {

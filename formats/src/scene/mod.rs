@@ -4,11 +4,15 @@
 
 mod check;
 mod error;
+mod fit;
 mod front;
 mod geometry;
+mod held;
+mod initial;
 mod law;
 mod material;
 mod numerics;
+mod period;
 mod raw;
 mod walls;
 
@@ -336,13 +340,14 @@ pub struct Numerics {
     pub viscosity_on_approach: bool,
     /// Quadratic artificial viscosity beta, on approaching pairs.
     pub quadratic_viscosity: f64,
-    /// Linear damping of the velocity, 1/s: for columns that settle, not for flows.
+    /// Linear damping of the velocity, 1/s. Where the material can flow only if the scene forces it.
     pub damping: f64,
     /// Density over the initial one below which the material has come apart and carries no stress; 0 switches it off.
+    /// Only where the mean stress is integrated: one that follows from the density needs no gate.
     pub density_gate: f64,
     /// Diffusion of density delta (delta-SPH); 0 switches it off.
     pub density_diffusion: f64,
-    /// Diffusion of stress zeta; 0 switches it off.
+    /// Diffusion of stress zeta; 0 switches it off, as in fluids, where stress follows from density and strain rate.
     pub stress_diffusion: f64,
     /// Artificial stress epsilon against clumping in tension; 0 switches it off.
     pub artificial_stress: f64,

@@ -18,8 +18,8 @@ pub(super) struct Place {
     pub space: Option<Space>,
     pub kernel: Kernel,
     pub h_over_dx: f64,
-    /// Is the material held on all sides, so that it can only settle?
-    pub held: bool,
+    /// What lets the material flow; None where it can only settle.
+    pub flow: Option<String>,
 }
 
 /// The numbers, with the defaults of the law; None without a law.
@@ -54,19 +54,28 @@ pub(super) fn read(root: &Table<'_>, place: Place, material: Option<&Material>) 
         let reason = "the hoop stress of the innermost rings limits the time step in the axisymmetric space";
         table.faults.at(found, format!("{source} is too large; it must be in (0, {most}] with this kernel: {reason}"));
     }
-    if let Some(found) = &damping
+    if let (Some(found), Some(flow)) = (&damping, &place.flow)
         && found.value > 0.0
-        && !place.held
         && !forced.as_ref().is_some_and(|forced| forced.value)
     {
-        let message = "damps a flow: the material is not held by walls, planes of symmetry or periods on every side, and \
-                       its run-out would be too short; drop it, or set damping-in-flow = \"forced\"";
-        table.faults.at(found, message);
+        let message = format!("damps a flow ({flow}): run-outs would be too short, and speeds too low");
+        table.faults.at(found, format!("{message}; drop it, or set damping-in-flow = \"forced\""));
     }
-    if let (Some(found), Some(Material::MuI(_) | Material::ViscoPlastic(_))) = (&density_gate, material)
-        && found.value > 0.0
-    {
-        table.faults.at(found, "the pressure of this law follows from the density: it needs no gate; drop this key");
+    if let Some(material) = material {
+        let useless = |found: &Option<Found<f64>>, is_useless: bool, reason: &str| {
+            if let (Some(found), true) = (found, is_useless) {
+                table.faults.at(found, format!("{reason}; drop this key"));
+            }
+        };
+        let gate = density_gate.clone().filter(|found| found.value > 0.0);
+        let reason = "the pressure of this law follows from the density, so that lost volume comes back without a gate";
+        useless(&gate, material.ties_pressure_to_density(), reason);
+        let diffused = stress_diffusion.clone().filter(|found| found.value > 0.0);
+        let reason =
+            "the stress of a fluid follows from density and strain rate: what is diffused would be lost at once";
+        useless(&diffused, material.is_fluid(), reason);
+        let reason = "is used only with a viscosity, that of visco-plastic or of mu-i with unyielded = \"cap\"";
+        useless(&viscous_courant, !material.is_fluid(), reason);
     }
     table.finish();
     let or = |found: Option<Found<f64>>, default| found.map_or(default, |found| found.value);

@@ -19,6 +19,9 @@ pub enum FileError {
     /// Written by a later version of this program.
     #[error("{path}: has format version {found}, this program reads up to {known}; use a newer program")]
     Newer { path: String, found: u64, known: u64 },
+    /// Written by an earlier version of this program.
+    #[error("{path}: has format version {found}, this program reads {known}; prepare the scene anew with sph-prep")]
+    Older { path: String, found: u64, known: u64 },
     /// Of the right kind, but cut off or changed.
     #[error("{path}: damaged: {what}; restore it from a copy, or make it again")]
     Damaged { path: String, what: String },
@@ -40,6 +43,7 @@ impl FileError {
             | Self::CannotRead { .. }
             | Self::WrongKind { .. }
             | Self::Newer { .. }
+            | Self::Older { .. }
             | Self::Damaged { .. } => exit::NO_INPUT,
             Self::CannotWrite { .. } | Self::DiskFull { .. } => exit::CANNOT_WRITE,
         }

@@ -21,7 +21,7 @@ use crate::{kernel::Kernel, schema, schema::Field, schema::Kept, space::Space};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Version of the layout; a newer one is refused.
+/// Version of the layout; newer and older ones are refused.
 pub const FORMAT_VERSION: u64 = 2;
 
 /// What a particle file says of itself.

@@ -8,6 +8,7 @@ use crate::schema::{Field, Kept, Rank};
 use crate::{kernel::Kernel, space::Space};
 use hdf5::{Dataset, Group};
 use sha2::{Digest, Sha256};
+use std::cmp::Ordering;
 use std::io::Read;
 use std::{fs, ops::Range, path::Path};
 
@@ -27,7 +28,7 @@ struct Open {
 /// Reads what a particle file says of itself, and checks that its datasets have the shapes it says. Serial.
 ///
 /// # Errors
-/// `NotFound`, `CannotRead`; `WrongKind` for what is no particle file; `Newer`; `Damaged` for one that is cut off or
+/// `NotFound`, `CannotRead`; `WrongKind` for what is no particle file; `Newer`, `Older`; `Damaged` for one that is cut off or
 /// changed.
 pub fn read_header(path: &Path) -> Result<Header, FileError> {
     open(path).map(|open| open.header)
@@ -132,8 +133,11 @@ fn examine(path: &Path, file: &hdf5::File) -> Result<Open, FileError> {
         .attr("format_version")
         .and_then(|attribute| attribute.read_scalar())
         .map_err(|_| foreign("/sph has no format_version; a particle file of talus is needed"))?;
-    if version > FORMAT_VERSION {
-        return Err(FileError::Newer { path: path.display().to_string(), found: version, known: FORMAT_VERSION });
+    let (name, known) = (|| path.display().to_string(), FORMAT_VERSION);
+    match version.cmp(&known) {
+        Ordering::Greater => return Err(FileError::Newer { path: name(), found: version, known }),
+        Ordering::Less => return Err(FileError::Older { path: name(), found: version, known }),
+        Ordering::Equal => {}
     }
     let damaged = |what: hdf5::Error| FileError::damaged(path, what);
     let (header, kept) = header(&sph).map_err(damaged)?;

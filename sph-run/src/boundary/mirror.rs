@@ -1,6 +1,7 @@
 //! Mirror images behind the planes of symmetry x = 0 and y = 0; the axis of the axisymmetric space is one such plane.
 
 use crate::algebra::Vector;
+use crate::boundary::field::Field;
 use crate::particles::{Particles, id, key};
 use crate::space::Space;
 
@@ -64,6 +65,20 @@ impl Mirrors {
             p.stress[i] = S::stress_from_disk(reflect_stress(S::stress_to_disk(p.stress[j]), through));
             p.volume[i] = p.volume[j];
         }
+    }
+
+    /// Gives a field that owned particles and their copies have to their images too, and zero to wall particles.
+    pub fn spread<const D: usize, const N: usize, S: Space<D, N>, T: Field<D, N>>(
+        p: &Particles<D, N>,
+        images: &[Image],
+        field: &mut Vec<T>,
+    ) {
+        field.truncate(p.halo);
+        for image in images {
+            let through = [image.planes & 1 != 0, image.planes & 2 != 0, false];
+            field.push(field[image.source as usize].reflected::<S>(through));
+        }
+        field.resize(p.len(), T::zero());
     }
 
     /// Puts an owned particle that crossed a plane back, as its own image.

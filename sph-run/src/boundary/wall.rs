@@ -9,8 +9,9 @@ use crate::boundary::mirror::reflect_stress;
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 use crate::physics::Kernel;
+use crate::rates::wall::{extrapolate, weights};
 use crate::space::Space;
-use crate::sweep::{self, Pairs};
+use crate::sweep::Pairs;
 use formats::scene::{Site, WallLattice};
 
 /// What a wall does to the velocity and the stress extrapolated behind it.
@@ -73,13 +74,20 @@ impl Walls {
         neighbors: &Neighbors,
         pairs: Pairs,
     ) {
-        sweep::wall_weights::<D, N, K>(p, neighbors, pairs, &mut self.weights);
+        weights::<D, N, K>(p, neighbors, pairs, &mut self.weights);
         for (wall, parity) in self.parities.iter().enumerate() {
-            let mut v = S::to_disk(sweep::extrapolate(neighbors, &self.weights, wall, &p.v));
+            let mut v = S::to_disk(extrapolate(neighbors, &self.weights, wall, &p.v));
             for a in 0..3 {
                 v[a] *= parity.velocity[a];
             }
             p.v[p.mirror + wall] = S::from_disk(v);
+        }
+    }
+
+    /// Extrapolates a field that does not change across the wall.
+    pub fn extend(&self, mirror: usize, neighbors: &Neighbors, field: &mut [f64]) {
+        for wall in 0..self.parities.len() {
+            field[mirror + wall] = extrapolate(neighbors, &self.weights, wall, field);
         }
     }
 
@@ -90,7 +98,7 @@ impl Walls {
         neighbors: &Neighbors,
     ) {
         for (wall, parity) in self.parities.iter().enumerate() {
-            let stress = S::stress_to_disk(sweep::extrapolate(neighbors, &self.weights, wall, &p.stress));
+            let stress = S::stress_to_disk(extrapolate(neighbors, &self.weights, wall, &p.stress));
             p.stress[p.mirror + wall] = S::stress_from_disk(reflect_stress(stress, parity.reflected));
         }
     }

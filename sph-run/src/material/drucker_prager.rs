@@ -1,8 +1,8 @@
 //! Elastic, perfectly plastic material with the Drucker-Prager criterion.
 
-use super::{History, Material, rotation};
+use super::{History, Increment, Material, rotation};
 use crate::algebra::Sym;
-use formats::scene::{self, Rotation};
+use formats::scene::{self, MeanStress, Rotation};
 
 const THIRD: f64 = 1.0 / 3.0;
 
@@ -32,7 +32,12 @@ pub struct DruckerPrager {
     relief: f64,
     /// Deviatoric plastic strain per fall of sqrt(J2): 1/(sqrt(3) G).
     strain_per_stress: f64,
-    sound_speed: f64,
+    /// Where the mean stress comes from. From the density: p = K (rho/rho0 - 1), which without dilation is the integral of
+    /// the rate, and remembers what a tension cut-off forgets: volume gained in free flight carries nothing until it is
+    /// given back.
+    pub mean_stress: MeanStress,
+    /// Density rho0 without stress, kg/m3.
+    pub density: f64,
 }
 
 impl DruckerPrager {
@@ -51,7 +56,8 @@ impl DruckerPrager {
             apex: if alpha > 0.0 { k / alpha } else { f64::INFINITY },
             relief: 9.0 * bulk * alpha_psi / (shear + 9.0 * bulk * alpha * alpha_psi),
             strain_per_stress: 1.0 / (3f64.sqrt() * shear),
-            sound_speed: ((bulk + 4.0 / 3.0 * shear) / scene.density).sqrt(),
+            mean_stress: scene.mean_stress,
+            density: scene.density,
         }
     }
 
@@ -71,8 +77,12 @@ impl DruckerPrager {
 
 impl Material for DruckerPrager {
     #[inline(always)]
-    fn stress<const N: usize>(&self, stress: Sym<N>, strain: Sym<N>, history: &mut History) -> Sym<N> {
-        let trial = self.elastic(stress, strain);
+    fn stress<const N: usize>(&self, stress: Sym<N>, step: &Increment<N>, history: &mut History) -> Sym<N> {
+        let mut trial = self.elastic(stress, step.strain);
+        if self.mean_stress == MeanStress::Density {
+            let pressure = self.bulk * (step.density / self.density - 1.0);
+            trial = trial.deviator() + Sym::isotropic(-pressure);
+        }
         let trace = trial.trace();
         let deviator = trial - Sym::isotropic(trace * THIRD);
         let root_j2 = (0.5 * deviator.contract(deviator)).sqrt();
@@ -96,14 +106,5 @@ impl Material for DruckerPrager {
     #[inline(always)]
     fn rotate<const N: usize>(&self, stress: Sym<N>, spin: [f64; 3], dt: f64) -> Sym<N> {
         rotation::rotate(stress, spin, dt, self.rotation)
-    }
-
-    fn elastic_energy<const N: usize>(&self, stress: Sym<N>) -> f64 {
-        let (trace, deviator) = (stress.trace(), stress.deviator());
-        trace * trace / (18.0 * self.bulk) + deviator.contract(deviator) / (4.0 * self.shear)
-    }
-
-    fn sound_speed(&self) -> f64 {
-        self.sound_speed
     }
 }

@@ -2,6 +2,7 @@
 //! twice a step.
 
 use crate::algebra::Vector;
+use crate::boundary::field::Field;
 use crate::neighbors::bounds;
 use crate::parallel::exchange::{exchange, payloads};
 use crate::particles::Particles;
@@ -86,16 +87,51 @@ impl Halo {
         p: &mut Particles<D, N>,
         fields: Fields,
     ) {
-        let words = fields.words(D, N);
-        self.outgoing.clear();
-        for &i in self.send.iter().flatten() {
-            let i = i as usize;
-            self.outgoing.push(p.volume[i].to_bits());
+        let (owned, words) = (p.owned, fields.words(D, N));
+        self.pack(|i, message| {
+            message.push(p.volume[i].to_bits());
             match fields {
-                Fields::Motion => self.outgoing.extend(p.x[i].0.iter().chain(&p.v[i].0).map(|f| f.to_bits())),
-                Fields::Stress => self.outgoing.extend(p.stress[i].0.iter().map(|f| f.to_bits())),
+                Fields::Motion => message.extend(p.x[i].0.iter().chain(&p.v[i].0).map(|f| f.to_bits())),
+                Fields::Stress => message.extend(p.stress[i].0.iter().map(|f| f.to_bits())),
+            }
+        });
+        self.send(comm, words);
+        for (i, copy) in (owned..).zip(self.incoming.chunks_exact(words)) {
+            let real = |k: usize| f64::from_bits(copy[k]);
+            p.volume[i] = real(0);
+            match fields {
+                Fields::Motion => {
+                    p.x[i] = Vector(std::array::from_fn(|a| real(1 + a)));
+                    p.v[i] = Vector(std::array::from_fn(|a| real(1 + D + a)));
+                }
+                Fields::Stress => p.stress[i].0 = std::array::from_fn(|a| real(1 + a)),
             }
         }
+    }
+
+    /// Gives a field of the owned particles to the copies on other ranks.
+    pub fn spread<const D: usize, const N: usize, T: Field<D, N>>(
+        &mut self,
+        comm: &Communicator,
+        owned: usize,
+        field: &mut Vec<T>,
+    ) {
+        field.truncate(owned);
+        self.pack(|i, message| field[i].pack(message));
+        self.send(comm, T::WORDS);
+        field.extend(self.incoming.chunks_exact(T::WORDS).map(T::unpack));
+    }
+
+    /// Packs what the peers get of the owned particles.
+    fn pack(&mut self, pack: impl Fn(usize, &mut Vec<u64>)) {
+        self.outgoing.clear();
+        for &i in self.send.iter().flatten() {
+            pack(i as usize, &mut self.outgoing);
+        }
+    }
+
+    /// Exchanges what was packed, `words` a particle.
+    fn send(&mut self, comm: &Communicator, words: usize) {
         self.incoming.resize(self.receive.iter().sum::<usize>() * words, 0);
         let mut outgoing: Vec<&[u64]> = Vec::with_capacity(self.peers.len());
         let mut rest: &[u64] = &self.outgoing;
@@ -112,17 +148,6 @@ impl Halo {
             rest = tail;
         }
         payloads(comm, &self.peers, &outgoing, incoming);
-        for (i, copy) in (p.owned..p.halo).zip(self.incoming.chunks_exact(words)) {
-            let real = |k: usize| f64::from_bits(copy[k]);
-            p.volume[i] = real(0);
-            match fields {
-                Fields::Motion => {
-                    p.x[i] = Vector(std::array::from_fn(|a| real(1 + a)));
-                    p.v[i] = Vector(std::array::from_fn(|a| real(1 + D + a)));
-                }
-                Fields::Stress => p.stress[i].0 = std::array::from_fn(|a| real(1 + a)),
-            }
-        }
     }
 }
 
