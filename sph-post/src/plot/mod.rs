@@ -2,9 +2,16 @@
 
 mod basal;
 mod canvas;
+mod energies;
+mod failure_plane;
+mod flow;
+mod layers;
+mod panels;
 mod particles;
 mod profiles;
+mod runout;
 mod series;
+mod stress;
 mod top_view;
 
 use crate::{analysis::Analysis, failure::Failure};
@@ -16,7 +23,20 @@ use std::path::{Path, PathBuf};
 /// Where a picture can't be written.
 pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut paths = Vec::new();
-    for draw in [profiles::draw, series::draw, particles::draw, top_view::draw, basal::draw] {
+    let all = [
+        profiles::draw,
+        runout::draw,
+        series::draw,
+        energies::draw,
+        particles::draw,
+        layers::draw,
+        flow::draw,
+        failure_plane::draw,
+        top_view::draw,
+        stress::draw,
+        basal::draw,
+    ];
+    for draw in all {
         paths.extend(draw(analysis, folder)?);
     }
     Ok(paths)

@@ -71,9 +71,9 @@ fn fronts(a: &Analysis, unit: f64) -> (Vec<Curve>, String) {
         (false, false) => "x (m)",
     };
     let curves = vec![
-        ("furthest particle", curve(&|f| f.furthest)),
+        ("true: furthest particle", curve(&|f| f.furthest)),
         ("99.5 % of the mass", curve(&|f| f.mass)),
-        ("thickness \u{2265} dx/2", curve(&|f| f.thickness)),
+        ("effective: thickness \u{2265} dx/2", curve(&|f| f.thickness)),
     ];
     (curves, name.into())
 }

@@ -1,0 +1,65 @@
+//! The failure plane of a column that begins to fall (Szewc 2017, Fig 8).
+
+use super::canvas::{self, Entry};
+use super::panels::{self, Line, Panel, Patch, Picture};
+use super::particles::by_shade;
+use crate::{analysis::Analysis, failure::Failure};
+use plotters::style::{
+    RGBColor,
+    text_anchor::{HPos, VPos},
+};
+use std::path::{Path, PathBuf};
+
+/// The particles on the surface: seen on all of viridis.
+const MARK: RGBColor = RGBColor(213, 60, 0);
+
+/// The line on the section, and beside it.
+const ON: RGBColor = RGBColor(255, 255, 255);
+const BESIDE: RGBColor = RGBColor(110, 110, 110);
+
+/// Draws `failure-plane.svg` and `.png`; nothing where the snapshot nearest to the wanted time shows no plane.
+pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let Some(moment) = a.failure.map(|k| &a.moments[k]) else { return Ok(Vec::new()) };
+    let (g, plane) = (&a.geometry, &moment.failure_plane);
+    let (Some(line), Some(scatter)) = (plane.line, &moment.scatter) else { return Ok(Vec::new()) };
+    let mut patches = by_shade(g, scatter, |q| q.speed / plane.top_speed);
+    let mark = |at: &[f64; 2]| Patch { at: *at, half: [0.3 * g.dx; 2], colour: MARK };
+    patches.extend(plane.marked.iter().map(mark));
+    let contour: Vec<[f64; 2]> = plane.surface.iter().enumerate().map(|(j, s)| [*s, (j as f64 + 0.5) * g.dx]).collect();
+    let [low, high] = line.ends;
+    // On to the floor and as far up again, to read the angle from.
+    let reach = |z: f64| low[0] + (high[0] - low[0]) * (z - low[1]) / (high[1] - low[1]);
+    let top = (high[1] + low[1]).min(moment.deposit.height_max);
+    let picture = Picture {
+        name: "failure-plane",
+        what: "failure plane",
+        remark: format!(
+            "the plane rises at {:.1}\u{b0}; points deviate from it by {:.2} dx (root mean square)",
+            line.angle_deg,
+            line.scatter / g.dx
+        ),
+        panels: vec![Panel {
+            moment,
+            patches,
+            lines: vec![
+                Line { points: contour, colour: ON, width: 1.6, dashed: false },
+                Line { points: vec![[reach(0.0), 0.0], [reach(top), top]], colour: ON, width: 2.4, dashed: true },
+            ],
+        }],
+        legend_width: 250.0,
+        without_strays: true,
+    };
+    panels::draw(a, folder, &picture, |area, at, lowest| {
+        let end = (lowest - 110.0).max(at[1] + 90.0);
+        canvas::colour_bar(area, at[0], [at[1], end], [0.0, plane.top_speed], "|v| (m/s)")?;
+        let marks = [(MARK, "9.5 to 10.5 % of the top speed".to_string())];
+        canvas::swatches(area, at[0], end + 28.0, &marks)?;
+        let lines = [
+            Entry { text: "10 % of the top speed", colour: BESIDE, dashed: false },
+            Entry { text: "straight line", colour: BESIDE, dashed: true },
+        ];
+        canvas::legend(area, at[0], end + 50.0, &lines)?;
+        let small = canvas::style(canvas::SMALL, HPos::Left, VPos::Top);
+        canvas::write(area, "(lines white on the section)", at[0], end + 82.0, small)
+    })
+}
