@@ -1,21 +1,23 @@
 //! The failure plane of a column that begins to fall (Szewc 2017, Fig 8).
 
-use super::canvas::{self, Entry};
+use super::canvas::{self, Entry, viridis};
 use super::panels::{self, Line, Panel, Patch, Picture};
 use super::particles::by_shade;
 use crate::{analysis::Analysis, failure::Failure};
-use plotters::style::{
-    RGBColor,
-    text_anchor::{HPos, VPos},
+use plotters::{
+    element::Rectangle,
+    style::{Color, RGBColor},
 };
 use std::path::{Path, PathBuf};
 
 /// The particles on the surface: seen on all of viridis.
 const MARK: RGBColor = RGBColor(213, 60, 0);
 
-/// The line on the section, and beside it.
-const ON: RGBColor = RGBColor(255, 255, 255);
-const BESIDE: RGBColor = RGBColor(110, 110, 110);
+/// The surface, seen on all of viridis but its brightest end.
+const SURFACE: RGBColor = RGBColor(255, 255, 255);
+
+/// The straight line, seen on viridis and on white.
+const STRAIGHT: RGBColor = RGBColor(230, 110, 170);
 
 /// Draws `failure-plane.svg` and `.png`; nothing where the snapshot nearest to the wanted time shows no plane.
 pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
@@ -42,11 +44,11 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
             moment,
             patches,
             lines: vec![
-                Line { points: contour, colour: ON, width: 1.6, dashed: false },
-                Line { points: vec![[reach(0.0), 0.0], [reach(top), top]], colour: ON, width: 2.4, dashed: true },
+                Line { points: contour, colour: SURFACE, width: 1.6, dashed: false },
+                Line { points: vec![[reach(0.0), 0.0], [reach(top), top]], colour: STRAIGHT, width: 2.6, dashed: true },
             ],
         }],
-        legend_width: 250.0,
+        legend_width: 270.0,
         without_strays: true,
     };
     panels::draw(a, folder, &picture, |area, at, lowest| {
@@ -54,12 +56,13 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         canvas::colour_bar(area, at[0], [at[1], end], [0.0, plane.top_speed], "|v| (m/s)")?;
         let marks = [(MARK, "9.5 to 10.5 % of the top speed".to_string())];
         canvas::swatches(area, at[0], end + 28.0, &marks)?;
+        // A white line needs a dark ground.
+        let ground = [canvas::place(at[0], end + 43.5), canvas::place(at[0] + 24.0, end + 56.5)];
+        area.draw(&Rectangle::new(ground, viridis(0.1).filled()))?;
         let lines = [
-            Entry { text: "10 % of the top speed", colour: BESIDE, dashed: false },
-            Entry { text: "straight line", colour: BESIDE, dashed: true },
+            Entry { text: "10 % of the top speed", colour: SURFACE, dashed: false },
+            Entry { text: "straight line through its middle", colour: STRAIGHT, dashed: true },
         ];
-        canvas::legend(area, at[0], end + 50.0, &lines)?;
-        let small = canvas::style(canvas::SMALL, HPos::Left, VPos::Top);
-        canvas::write(area, "(lines white on the section)", at[0], end + 82.0, small)
+        canvas::legend(area, at[0], end + 50.0, &lines)
     })
 }

@@ -1,6 +1,7 @@
 //! Pictures: SVG and PNG of the same drawing, side by side in `post/`.
 
 mod basal;
+mod basal_normalised;
 mod canvas;
 mod energies;
 mod failure_plane;
@@ -12,6 +13,7 @@ mod profiles;
 mod runout;
 mod series;
 mod stress;
+mod surfaces;
 mod top_view;
 
 use crate::{analysis::Analysis, failure::Failure};
@@ -25,6 +27,7 @@ pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Fail
     let mut paths = Vec::new();
     let all = [
         profiles::draw,
+        surfaces::draw,
         runout::draw,
         series::draw,
         energies::draw,
@@ -35,6 +38,7 @@ pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Fail
         top_view::draw,
         stress::draw,
         basal::draw,
+        basal_normalised::draw,
     ];
     for draw in all {
         paths.extend(draw(analysis, folder)?);

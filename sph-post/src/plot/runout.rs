@@ -39,7 +39,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
             100.0 * strays.share
         ),
         panels: vec![Panel { moment: last, patches, lines }],
-        legend_width: 330.0,
+        legend_width: 360.0,
         without_strays: false,
     };
     let texts = [

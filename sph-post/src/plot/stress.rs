@@ -12,7 +12,7 @@ const SHADES: f64 = 96.0;
 const MOST: usize = 6000;
 
 /// The scale ends at the pressure that this part of the cells lies below: single particles go higher.
-const SEEN: f64 = 0.998;
+const SEEN: f64 = 0.99;
 
 /// Draws `stress-sections.svg` and `.png`; nothing without gravity.
 pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
@@ -32,7 +32,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
             (3, true) => "vertical stress, mean over the angle",
             _ => "vertical stress",
         },
-        remark: String::new(),
+        remark: format!("colours end where {} % of the cells lie below", 100.0 * SEEN),
         panels: sections().map(panel).collect(),
         legend_width: 150.0,
         without_strays: true,
@@ -59,7 +59,7 @@ fn cells(a: &Analysis, section: &Section, most: f64) -> Vec<Patch> {
                 let shade = (-sum / count / most * SHADES).clamp(0.0, SHADES) as u32;
                 let half = 0.5 * step as f64 * g.dx;
                 let at = [section.along(g, k) - 0.5 * g.dx + half, j as f64 * g.dx + half];
-                cells.push((shade, Patch { at, half: [half * 1.03; 2], colour: viridis(f64::from(shade) / SHADES) }));
+                cells.push((shade, Patch { at, half: [half * 1.15; 2], colour: viridis(f64::from(shade) / SHADES) }));
             }
         }
     }
