@@ -16,9 +16,6 @@ pub fn inside(a: &Analysis, d: &mut Dataset, first: i64, count: usize) {
     let rows = sections.iter().map(|s| s.1.rows).chain(a.moments.iter().map(|m| m.failure_plane.surface.len()));
     let rows = rows.max().unwrap_or(1).max(1);
     coordinate(a, d, "z", "height above the floor", 0, rows);
-    if let Some(z) = d.variables.iter_mut().find(|v| v.name == "z") {
-        z.attributes.extend([("axis".into(), "Z".into()), ("positive".into(), "up".into())]);
-    }
     failure(a, d, rows);
     self::sections(a, d, &sections, [first, count as i64], rows);
 }

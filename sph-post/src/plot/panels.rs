@@ -136,6 +136,10 @@ fn ranges(a: &Analysis, picture: &Picture, lengths: &Lengths) -> ([f64; 2], [f64
         x = [x[0].min(patch.at[0]), x[1].max(patch.at[0])];
         z = z.max(patch.at[1] + patch.half[1]);
     }
+    if !picture.without_strays {
+        let marks = picture.panels.iter().flat_map(|p| &p.lines).flat_map(|l| &l.points);
+        x[1] = marks.fold(x[1], |x, p| x.max(p[0]));
+    }
     let right = if picture.without_strays { x[1].min(1.15 * furthest.max(g.dx)) } else { 1.04 * x[1] } + g.dx;
     let left = if g.mirrored[0] { -right } else { x[0].max(-2.0 * right - g.dx) - g.dx };
     let y = [-0.5 * g.dx / lengths.unit, 1.04 * z.max(g.dx) / lengths.unit];

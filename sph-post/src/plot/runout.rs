@@ -32,7 +32,11 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let strays = last.deposit.strays;
     let picture = Picture {
         name: "run-out",
-        what: "effective and true run-out",
+        what: if g.space.dimension() == 3 {
+            "effective and true run-out, vertical section"
+        } else {
+            "effective and true run-out"
+        },
         remark: format!(
             "{} particles, {:.2} % of the mass, lie beyond the effective front",
             strays.count,
