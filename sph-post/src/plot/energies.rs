@@ -1,6 +1,6 @@
 //! Where the potential energy went, and whether the energies add up (Szewc 2017, Fig 7).
 
-use super::canvas::{self, Entry, Frame, INK, MARGIN, SMALL, viridis};
+use super::canvas::{self, Entry, Frame, INK, MARGIN, SMALL};
 use super::{Times, title};
 use crate::{analysis::Analysis, failure::Failure};
 use formats::space::Space;
@@ -12,6 +12,12 @@ use std::path::{Path, PathBuf};
 
 /// Size of the part inside each pair of axes, pixels.
 const INNER: [[f64; 2]; 2] = [[560.0, 300.0], [560.0, 130.0]];
+
+/// Of the same set as [`canvas::CURVES`].
+const VISCOUS: RGBColor = RGBColor(86, 180, 233);
+
+/// The least range of the error that is shown, %.
+const LEAST_ERROR: f64 = 0.01;
 
 /// Draws `energies.svg` and `.png`; nothing where the history does not tell the work that was done.
 pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
@@ -32,7 +38,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         ("kinetic", canvas::CURVES[1], curve(&p.kinetic, 0.0)),
         ("elastic", canvas::CURVES[2], curve(&p.elastic, 0.0)),
         ("plastic work", canvas::CURVES[3], curve(&p.plastic, 0.0)),
-        ("viscous work", viridis(0.0), curve(&p.viscous, 0.0)),
+        ("viscous work", VISCOUS, curve(&p.viscous, 0.0)),
         ("sum", INK, curve(&sum, floor)),
     ];
     let closure: Vec<(f64, f64)> = p.times.iter().zip(&p.closure).map(|(t, c)| (t / times.unit, 100.0 * c)).collect();
@@ -45,7 +51,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let name = if relative { "energy / potential energy at the start" } else { unit };
     let left = MARGIN[0] + 8.0;
     let tops = [56.0, 56.0 + INNER[0][1] + MARGIN[1] + 22.0];
-    let paper = [(left + INNER[0][0] + 190.0) as i32, (tops[1] + INNER[1][1] + MARGIN[1] + 8.0) as i32];
+    let paper = [(left + INNER[0][0] + 220.0) as i32, (tops[1] + INNER[1][1] + MARGIN[1] + 8.0) as i32];
     canvas::save(folder, "energies", paper, |area| {
         canvas::write(area, &title(a, "energies"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
         canvas::write(area, &times.explained, 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;
@@ -63,8 +69,11 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
             entries.push(Entry { text, colour: *colour, dashed: false });
         }
         canvas::legend(area, inner(0)[2] + 18.0, inner(0)[1] + 12.0, &entries)?;
-        let frame =
-            Frame { y: range(&mut closure.iter().map(|p| p.1), 1e-6), y_name: Some("error (%)".into()), ..frame };
+        let frame = Frame {
+            y: range(&mut closure.iter().map(|p| p.1), LEAST_ERROR),
+            y_name: Some("error (%)".into()),
+            ..frame
+        };
         let mut chart = canvas::axes(area, inner(1), &frame)?;
         canvas::curve(&mut chart, &closure, canvas::pen(INK, 2.0))?;
         let place = [inner(1)[2] + 18.0, inner(1)[1] + 12.0];
