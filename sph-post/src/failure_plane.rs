@@ -145,10 +145,7 @@ fn line(g: &Geometry, surface: &[f64]) -> Option<Line> {
     if low > MIDDLE[0] * best.end as f64 {
         return None;
     }
-    let middle = |j: &usize| {
-        let part = (*j as f64 + 0.5 - low) / length;
-        part >= MIDDLE[0] && part <= MIDDLE[1]
-    };
+    let middle = |j: &usize| (MIDDLE[0]..=MIDDLE[1]).contains(&((*j as f64 + 0.5 - low) / length));
     let points: Vec<[f64; 2]> = best.filter(middle).map(|j| [surface[j], Section::above(g, j)]).collect();
     fit(&points)
 }

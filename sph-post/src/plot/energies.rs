@@ -19,6 +19,9 @@ const VISCOUS: RGBColor = RGBColor(86, 180, 233);
 /// The least range of the error that is shown, %.
 const LEAST_ERROR: f64 = 0.01;
 
+/// A curve, its name and its colour.
+type Curve = (&'static str, RGBColor, Vec<(f64, f64)>);
+
 /// Draws `energies.svg` and `.png`; nothing where the history does not tell the work that was done.
 pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let Some(p) = &a.partition else { return Ok(Vec::new()) };
@@ -33,7 +36,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let sum: Vec<f64> = (0..p.times.len())
         .map(|k| p.kinetic[k] + p.potential[k] + p.elastic[k] + p.plastic[k] + p.viscous[k])
         .collect();
-    let curves: [(&str, RGBColor, Vec<(f64, f64)>); 6] = [
+    let curves: [Curve; 6] = [
         ("potential", canvas::CURVES[0], curve(&p.potential, floor)),
         ("kinetic", canvas::CURVES[1], curve(&p.kinetic, 0.0)),
         ("elastic", canvas::CURVES[2], curve(&p.elastic, 0.0)),
