@@ -312,6 +312,9 @@ pub fn legend(area: &Area, x: f64, y: f64, entries: &[Entry]) -> Drawn {
 
 /// A line through places in pixels, in dashes of 9 pixels with gaps of 6 if so wanted.
 pub fn polyline(area: &Area, points: &[(f64, f64)], style: ShapeStyle, dashed: bool) -> Drawn {
+    if points.len() < 2 {
+        return Ok(());
+    }
     if !dashed {
         return Ok(area.draw(&PathElement::new(points.iter().map(|p| place(p.0, p.1)).collect::<Vec<_>>(), style))?);
     }

@@ -29,9 +29,12 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     patches.extend(plane.marked.iter().map(mark));
     let contour: Vec<[f64; 2]> = plane.surface.iter().enumerate().map(|(j, s)| [*s, (j as f64 + 0.5) * g.dx]).collect();
     let [low, high] = line.ends;
-    // On to the floor and as far up again, to read the angle from.
+    // On to the floor and as far up again, to read the angle from, but not across the axis.
     let reach = |z: f64| low[0] + (high[0] - low[0]) * (z - low[1]) / (high[1] - low[1]);
-    let top = (high[1] + low[1]).min(moment.deposit.height_max);
+    let begin = g.extent.map_or(0.0, |e| e[0]);
+    let meets = low[1] + (high[1] - low[1]) * (begin - low[0]) / (high[0] - low[0]);
+    let top = if high[0] < low[0] { meets } else { f64::INFINITY };
+    let top = top.min(high[1] + low[1]).min(moment.deposit.height_max);
     let picture = Picture {
         name: "failure-plane",
         what: "failure plane",

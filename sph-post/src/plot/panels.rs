@@ -175,12 +175,63 @@ fn drawn(area: &Area, inner: [f64; 4], frame: &Frame, line: &Line, unit: f64, bo
     for side in sides {
         let place = |p: &[f64; 2]| {
             let x = inner[0] + (side * p[0] / unit - frame.x[0]) * scale;
-            let y = inner[3] - (p[1] / unit - frame.y[0]) * scale;
-            (x.clamp(inner[0], inner[2]), y.clamp(inner[1], inner[3]))
+            (x, inner[3] - (p[1] / unit - frame.y[0]) * scale)
         };
         let finite = line.points.iter().filter(|p| p[0].is_finite() && p[1].is_finite());
         let points: Vec<(f64, f64)> = finite.map(place).collect();
-        canvas::polyline(area, &points, canvas::pen(line.colour, line.width), line.dashed)?;
+        // Piece by piece, as far as it lies inside the frame.
+        let pieces = points.windows(2).filter_map(|ends| inside([ends[0], ends[1]], inner));
+        let mut joined: Vec<(f64, f64)> = Vec::new();
+        for [from, to] in pieces {
+            if joined.last() != Some(&from) {
+                canvas::polyline(area, &joined, canvas::pen(line.colour, line.width), line.dashed)?;
+                joined = vec![from];
+            }
+            joined.push(to);
+        }
+        canvas::polyline(area, &joined, canvas::pen(line.colour, line.width), line.dashed)?;
     }
     Ok(())
+}
+
+/// The part of a straight line that lies in a rectangle (left, top, right, bottom), if any: after Liang and Barsky (1984).
+fn inside([a, b]: [(f64, f64); 2], [left, top, right, bottom]: [f64; 4]) -> Option<[(f64, f64); 2]> {
+    let way = (b.0 - a.0, b.1 - a.1);
+    let mut part = [0.0_f64, 1.0_f64];
+    for (speed, room) in [(-way.0, a.0 - left), (way.0, right - a.0), (-way.1, a.1 - top), (way.1, bottom - a.1)] {
+        if speed < 0.0 {
+            part[0] = part[0].max(room / speed);
+        } else if speed > 0.0 {
+            part[1] = part[1].min(room / speed);
+        } else if room < 0.0 {
+            return None;
+        }
+    }
+    // Ends that need no cut keep their bits, so that pieces join.
+    let at = |t: f64| {
+        if t == 0.0 {
+            a
+        } else if t == 1.0 {
+            b
+        } else {
+            (a.0 + t * way.0, a.1 + t * way.1)
+        }
+    };
+    (part[0] <= part[1]).then(|| part.map(at))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_end_at_the_frame_and_keep_their_slope() {
+        let frame = [0.0, 0.0, 10.0, 10.0];
+        assert_eq!(inside([(-5.0, -5.0), (15.0, 15.0)], frame), Some([(0.0, 0.0), (10.0, 10.0)]));
+        assert_eq!(inside([(1.0, 2.0), (3.0, 4.0)], frame), Some([(1.0, 2.0), (3.0, 4.0)]));
+        assert_eq!(inside([(5.0, 5.0), (-5.0, 0.0)], frame), Some([(5.0, 5.0), (0.0, 2.5)]));
+        assert_eq!(inside([(3.0, -1.0), (3.0, 20.0)], frame), Some([(3.0, 0.0), (3.0, 10.0)]));
+        assert_eq!(inside([(-1.0, 0.0), (-1.0, 20.0)], frame), None);
+        assert_eq!(inside([(-3.0, 2.0), (2.0, -3.0)], frame), None);
+    }
 }

@@ -37,11 +37,15 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         } else {
             "effective and true run-out"
         },
-        remark: format!(
-            "{} particles, {:.2} % of the mass, lie beyond the effective front",
-            strays.count,
-            100.0 * strays.share
-        ),
+        remark: if !g.runs_outward {
+            String::new()
+        } else {
+            format!(
+                "{} particles, {:.2} % of the mass, lie beyond the effective front",
+                strays.count,
+                100.0 * strays.share
+            )
+        },
         panels: vec![Panel { moment: last, patches, lines }],
         legend_width: 360.0,
         without_strays: false,
