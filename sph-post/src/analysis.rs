@@ -5,10 +5,15 @@ use crate::{
     deposit::Deposit,
     energy::Energy,
     failure::Failure,
+    failure_plane::{FailurePlane, FailureTime},
+    flow::{Flow, StaticSpeed},
     geometry::Geometry,
     history::History,
+    layers::Layers,
+    partition::Partition,
     sample::Sampler,
     scatter::Scatter,
+    section::{self, Section},
 };
 use formats::{
     folder::RunFolder,
@@ -17,8 +22,24 @@ use formats::{
 };
 use std::path::{Path, PathBuf};
 
-/// Snapshots that are shown as particles: these many, spread over the run.
+/// Snapshots that are shown as particles coloured by speed: these many, spread over the run.
 const PANELS: usize = 6;
+
+/// Times at which the inside of the material is shown, in T = sqrt(H0/g); the end of the run is the last one.
+const SHOWN: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
+
+/// What to evaluate.
+#[derive(Clone, Copy, Debug)]
+pub struct Choices {
+    /// Height at which basal stresses are taken.
+    pub basal_height: Level,
+    /// Number of layers particles are marked by.
+    pub layers: usize,
+    /// Speed below which material is static.
+    pub static_speed: StaticSpeed,
+    /// When the failure plane is taken.
+    pub failure_time: FailureTime,
+}
 
 /// What one snapshot shows.
 #[derive(Clone, Debug)]
@@ -35,8 +56,16 @@ pub struct Moment {
     pub basal: Basal,
     /// Energies.
     pub energy: Energy,
+    /// Tops of the horizontal layers in the bins of the profile, m; none where the start is not known.
+    pub layer_tops: Option<Vec<Vec<f64>>>,
+    /// What stands and what flows.
+    pub flow: Flow,
+    /// The failure surface.
+    pub failure_plane: FailurePlane,
     /// The particles, thinned for a picture, where this snapshot is shown.
     pub scatter: Option<Scatter>,
+    /// Speed and stress inside, at the times of [`Analysis::sections`].
+    pub section: Option<Section>,
 }
 
 /// A run, evaluated.
@@ -54,8 +83,20 @@ pub struct Analysis {
     pub level: f64,
     /// At least one, ascending in time.
     pub moments: Vec<Moment>,
+    /// The snapshots shown by the speed of the particles: spread over the run.
+    pub spread: Vec<usize>,
+    /// The snapshots whose inside is shown: near 0, 0.5, 1, 1.5 and 2 T, and the last; without a T as `spread`.
+    pub sections: Vec<usize>,
+    /// The snapshot nearest to the time at which the failure plane is taken; none where that is unknown.
+    pub failure: Option<usize>,
+    /// Layers of the particles, if the start is known.
+    pub layers: Option<Layers>,
+    /// Speed below which material counts as static, m/s; NaN where it is unknown.
+    pub static_speed: f64,
     /// What the run wrote while it went on, if it has begun.
     pub history: Option<History>,
+    /// Where the energy went, if the history tells.
+    pub partition: Option<Partition>,
 }
 
 impl Analysis {
@@ -63,7 +104,7 @@ impl Analysis {
     ///
     /// # Errors
     /// Whatever is missing, damaged, or belongs to another scene.
-    pub fn of(folder: &RunFolder, level: Level) -> Result<Self, Failure> {
+    pub fn of(folder: &RunFolder, choices: Choices) -> Result<Self, Failure> {
         let no_run = |what: &str| Failure::NoRun { path: folder.path().display().to_string(), what: what.into() };
         if !folder.path().is_dir() {
             return Err(no_run("no such folder"));
@@ -80,20 +121,50 @@ impl Analysis {
         let hash = Scene::hash(&text);
         let files = files(folder, &hash)?;
         let geometry = Geometry::new(&scene);
-        let level = level.height(&geometry);
+        let level = choices.basal_height.height(&geometry);
+        let static_speed = choices.static_speed.value(&geometry);
+        let times: Vec<f64> = files.iter().map(|f| f.0).collect();
         let shown = spread(files.len(), PANELS);
+        let sections = geometry.time_scale().map_or_else(|| shown.clone(), |scale| at_times(&times, &SHOWN, scale));
+        let failure = Some(choices.failure_time.value(&geometry)).filter(|t| t.is_finite()).map(|t| nearest(&times, t));
+        let layers = start(folder, &files)?.map(|start| Layers::new(&geometry, &start, choices.layers));
         let mut moments = Vec::with_capacity(files.len());
-        for (number, file) in files.iter().enumerate() {
-            moments.push(moment(&geometry, file, level, shown.contains(&number))?);
+        for (number, (_, file)) in files.iter().enumerate() {
+            let inside = sections.contains(&number);
+            let drawn = inside || shown.contains(&number) || failure == Some(number);
+            let wanted = Wanted { level, static_speed, layers: layers.as_ref(), inside, drawn };
+            moments.push(moment(&geometry, file, &wanted)?);
         }
         let history = History::read(&folder.history())?;
-        Ok(Self { scene, text, hash, geometry, level, moments, history })
+        let partition = history.as_ref().and_then(Partition::of);
+        Ok(Self {
+            scene,
+            text,
+            hash,
+            geometry,
+            level,
+            moments,
+            spread: shown,
+            sections,
+            failure,
+            layers,
+            static_speed,
+            history,
+            partition,
+        })
     }
 
     /// The last snapshot.
     pub fn last(&self) -> &Moment {
         // `of` leaves at least one.
         &self.moments[self.moments.len() - 1]
+    }
+
+    /// Potential energy at the start, measured from the floor: what energies are scaled with. From the history where there is one.
+    pub fn start_potential(&self) -> f64 {
+        let energy = &self.moments[0].energy;
+        let first = self.history.as_ref().and_then(|h| h.column("potential_energy")?.first().copied());
+        energy.above_floor(&self.geometry, first.unwrap_or(energy.potential))
     }
 
     /// Run-out relative to the start: (front - r0)/r0, where r0 is the body's initial extent and the front is measured
@@ -107,24 +178,53 @@ impl Analysis {
     }
 }
 
-fn moment(geometry: &Geometry, file: &Path, level: f64, shown: bool) -> Result<Moment, Failure> {
+/// What is wanted of one snapshot.
+struct Wanted<'a> {
+    level: f64,
+    static_speed: f64,
+    layers: Option<&'a Layers>,
+    /// Keep the section?
+    inside: bool,
+    /// Keep the particles for pictures?
+    drawn: bool,
+}
+
+fn moment(geometry: &Geometry, file: &Path, wanted: &Wanted) -> Result<Moment, Failure> {
     let (header, rows) = snapshot::read(file)?;
     let sampler = Sampler::new(geometry, &rows);
     let deposit = Deposit::new(geometry, &rows, &sampler);
-    let basal = Basal::new(geometry, &rows, &sampler, &deposit, level);
+    let basal = Basal::new(geometry, &rows, &sampler, &deposit, wanted.level);
+    let section = Section::new(geometry, &rows, &sampler, &deposit.profile);
+    let layers = wanted.layers.filter(|layers| layers.are_of(&rows));
+    let plane = section::plane(geometry, &rows);
     Ok(Moment {
         time: header.time,
         step: header.step,
         particles: rows.len(),
         energy: Energy::new(geometry, &rows),
-        scatter: shown.then(|| Scatter::new(geometry, &rows)),
+        layer_tops: layers.map(|layers| layers.tops(geometry, &rows, &deposit.profile)),
+        flow: Flow::new(geometry, &rows, &section, wanted.static_speed),
+        failure_plane: FailurePlane::new(geometry, &rows, &deposit, &section, plane),
+        scatter: wanted.drawn.then(|| Scatter::new(geometry, &rows, layers, deposit.fronts.thickness)),
+        section: wanted.inside.then_some(section),
         deposit,
         basal,
     })
 }
 
-/// The files to evaluate, ascending in time; at least one. All belong to the scene of this hash.
-fn files(folder: &RunFolder, hash: &str) -> Result<Vec<PathBuf>, Failure> {
+/// Where the particles were at the start: from the file `sph-prep` made, else from a snapshot of that time.
+fn start(folder: &RunFolder, files: &[(f64, PathBuf)]) -> Result<Option<Vec<[f64; 3]>>, Failure> {
+    let initial = folder.initial();
+    let path = match files.first() {
+        _ if initial.exists() => &initial,
+        Some((time, path)) if *time <= 0.0 => path,
+        _ => return Ok(None),
+    };
+    Ok(Some(snapshot::read(path)?.1.position))
+}
+
+/// Times and files to evaluate, ascending in time; at least one. All belong to the scene of this hash.
+fn files(folder: &RunFolder, hash: &str) -> Result<Vec<(f64, PathBuf)>, Failure> {
     let mut numbered: Vec<(u64, PathBuf)> = Vec::new();
     let out = folder.out();
     match std::fs::read_dir(&out) {
@@ -149,8 +249,9 @@ fn files(folder: &RunFolder, hash: &str) -> Result<Vec<PathBuf>, Failure> {
         files.insert(0, folder.initial());
     }
     let mut before = f64::NEG_INFINITY;
-    for path in &files {
-        let header = snapshot::read_header(path)?;
+    let mut timed = Vec::with_capacity(files.len());
+    for path in files {
+        let header = snapshot::read_header(&path)?;
         let damaged = |what| FileError::Damaged { path: path.display().to_string(), what };
         if header.scene_hash != hash {
             let what = "it belongs to another scene than scene.lock.toml beside it".into();
@@ -165,8 +266,9 @@ fn files(folder: &RunFolder, hash: &str) -> Result<Vec<PathBuf>, Failure> {
             return Err(damaged(what).into());
         }
         before = header.time;
+        timed.push((header.time, path));
     }
-    Ok(files)
+    Ok(timed)
 }
 
 /// The number in `snapshot-000012.hdf`.
@@ -183,6 +285,26 @@ pub fn spread(count: usize, wanted: usize) -> Vec<usize> {
     (0..wanted).map(|i| (i * (count - 1) + (wanted - 1) / 2) / (wanted - 1)).collect()
 }
 
+/// The place of the time nearest to `wanted` among at least one that ascend.
+pub fn nearest(times: &[f64], wanted: f64) -> usize {
+    let after = times.partition_point(|t| *t < wanted).min(times.len() - 1);
+    let before = after.saturating_sub(1);
+    if wanted - times[before] < times[after] - wanted { before } else { after }
+}
+
+/// The places of the times nearest to `wanted`, in units of `scale`, and the last one; each once. A wanted time that no
+/// time is within half a unit of has none.
+pub fn at_times(times: &[f64], wanted: &[f64], scale: f64) -> Vec<usize> {
+    let near = |w: &f64| {
+        let place = nearest(times, w * scale);
+        ((times[place] - w * scale).abs() <= 0.5 * scale).then_some(place)
+    };
+    let mut places: Vec<usize> = wanted.iter().filter_map(near).chain([times.len() - 1]).collect();
+    places.sort_unstable();
+    places.dedup();
+    places
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -194,6 +316,15 @@ mod tests {
         for name in ["snapshot-12.hdf", "snapshot-000012.hdf.tmp", "snapshot-00001x.hdf", "snapshot.hdf.series"] {
             assert_eq!(number(name), None, "{name}");
         }
+    }
+
+    #[test]
+    fn the_nearest_times_are_found_once() {
+        let times = [0.0, 0.1, 0.2, 0.3, 0.9, 2.0];
+        assert_eq!([-1.0, 0.04, 0.06, 0.5, 0.7, 9.0].map(|t| nearest(&times, t)), [0, 0, 1, 3, 4, 5]);
+        assert_eq!(at_times(&times, &[0.0, 0.5, 1.0, 1.5, 2.0], 0.2), [0, 1, 2, 3, 5]);
+        assert_eq!(at_times(&times, &[0.0, 1.9, 3.0], 0.2), [0, 3, 5]);
+        assert_eq!(at_times(&[0.3], &[0.0, 0.5], 0.1), [0]);
     }
 
     #[test]

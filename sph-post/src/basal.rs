@@ -1,6 +1,6 @@
 //! Stresses near the floor, and whether they carry what lies above.
 
-use crate::{deposit::Deposit, geometry::Geometry, sample::Sampler};
+use crate::{deposit::Deposit, dip::Dip, geometry::Geometry, sample::Sampler};
 use formats::{snapshot::Rows, units};
 
 /// Where the stresses are taken: a height above the floor.
@@ -60,6 +60,8 @@ pub struct Basal {
     pub force: f64,
     /// Weight of the material above the surface, N: of the modelled part.
     pub weight: f64,
+    /// Pressure at the centre against the largest, with the axis and without.
+    pub dips: [Dip; 2],
 }
 
 impl Basal {
@@ -88,7 +90,8 @@ impl Basal {
         };
         let above = |z: f64| ((z - g.floor - level) / g.dx + 0.5).clamp(0.0, 1.0);
         let weight = rows.position.iter().zip(&rows.mass).map(|(x, m)| m * above(x[2])).sum::<f64>() * -g.gravity[2];
-        Self { profile, map, force, weight }
+        let dips = [false, true].map(|off_axis| Dip::new(g, p, &profile, off_axis));
+        Self { profile, map, force, weight, dips }
     }
 
     /// Force over weight: 1 at rest, where walls beside the material carry nothing. NaN without material above.

@@ -1,10 +1,10 @@
 //! The command line.
 
-use crate::basal::Level;
+use crate::{basal::Level, failure_plane::FailureTime, flow::StaticSpeed};
 use clap::Parser;
 use std::path::PathBuf;
 
-/// Evaluate a run: deposit, run-out, basal stresses, energies, and pictures of them.
+/// Evaluate a run: deposit, run-out, layers, failure plane, stresses, energies, and pictures of them.
 ///
 /// Works on the snapshots that are there, also while the run goes on; every call evaluates all of them anew.
 /// Serial: under mpirun one rank works and the others wait.
@@ -16,6 +16,17 @@ pub struct Arguments {
     /// Height above the floor at which basal stresses are taken: smoothing lengths, or a length as "12 mm"
     #[arg(long, value_name = "HEIGHT", default_value = "3 h", value_parser = Level::parse)]
     pub basal_height: Level,
+    /// Number of layers the particles are marked by, horizontal and vertical: 1 to 20
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..=20))]
+    pub layers: u8,
+    /// Speed below which material counts as static: a part of sqrt(g H0), or a velocity as "2 cm/s"
+    #[arg(long, value_name = "SPEED", default_value = "1 %", value_parser = StaticSpeed::parse)]
+    pub static_speed: StaticSpeed,
+    /// Time at which the failure plane is taken, from the nearest snapshot: multiples of T = sqrt(H0/g), or a time as "40 ms"
+    ///
+    /// The default is the 40 ms of Szewc (2017) in units of the T of the column there, 74 ms.
+    #[arg(long, value_name = "TIME", default_value = "0.54 T", value_parser = FailureTime::parse)]
+    pub failure_time: FailureTime,
     /// Print paths, warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,
@@ -39,6 +50,14 @@ mod tests {
         Arguments::command().debug_assert();
         let arguments = Arguments::try_parse_from(["sph-post", "run/"]).unwrap();
         assert_eq!(arguments.basal_height, Level::Smoothing(3.0));
-        assert!(Arguments::try_parse_from(["sph-post", "run/", "--basal-height", "3 kg"]).is_err());
+        assert_eq!(arguments.layers, 5);
+        assert_eq!(arguments.static_speed, StaticSpeed::Part(0.01));
+        assert_eq!(arguments.failure_time, FailureTime::Scaled(0.54));
+        for (option, wrong) in
+            [("basal-height", "3 kg"), ("layers", "0"), ("layers", "21"), ("static-speed", "1"), ("failure-time", "40")]
+        {
+            let option = format!("--{option}");
+            assert!(Arguments::try_parse_from(["sph-post", "run/", &option, wrong]).is_err(), "{option} {wrong}");
+        }
     }
 }

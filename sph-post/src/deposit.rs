@@ -42,6 +42,16 @@ pub struct Fronts {
     pub thickness: f64,
 }
 
+/// Particles that left the body and ran on by themselves (Yang et al. 2020, section 3.8 and Fig 11): those whose middle lies
+/// beyond the effective front, which is the one by thickness.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Strays {
+    /// How many.
+    pub count: usize,
+    /// Their mass over that of all.
+    pub share: f64,
+}
+
 /// The deposit in one snapshot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Deposit {
@@ -51,6 +61,8 @@ pub struct Deposit {
     pub map: Option<Map>,
     /// Run-out.
     pub fronts: Fronts,
+    /// What lies beyond the effective front.
+    pub strays: Strays,
     /// Largest height of the surface within two spacings of the axis or of x = 0, m.
     pub height_centre: f64,
     /// Largest height of the surface anywhere, m.
@@ -63,7 +75,7 @@ impl Deposit {
     /// The shape of `rows`.
     pub fn new(g: &Geometry, rows: &Rows, sampler: &Sampler) -> Self {
         let map = (g.space == Space::ThreeD).then(|| Map::new(g, rows, sampler));
-        let thickness = thickness(g, rows);
+        let thickness = thickness_of(g, rows, |_| true);
         let mut profile = Profile { first: thickness.first, height: Vec::new(), thickness: thickness.values };
         profile.height = match &map {
             Some(map) => map.mean(g, profile.first, profile.thickness.len(), &map.height, true),
@@ -72,6 +84,7 @@ impl Deposit {
                 .collect(),
         };
         let fronts = fronts(g, rows, &profile);
+        let strays = strays(g, rows, fronts.thickness);
         profile.trim();
         let top = |heights: &mut dyn Iterator<Item = (f64, f64)>| {
             heights.fold([0.0_f64; 2], |[centre, all], (away, h)| {
@@ -84,7 +97,7 @@ impl Deposit {
         };
         let volume: f64 = rows.mass.iter().zip(&rows.density).map(|(m, rho)| m / rho).sum();
         let mass: f64 = rows.mass.iter().sum();
-        Self { profile, map, fronts, height_centre, height_max, volume_ratio: volume * g.density / mass }
+        Self { profile, map, fronts, strays, height_centre, height_max, volume_ratio: volume * g.density / mass }
     }
 }
 
@@ -135,9 +148,11 @@ pub fn surface(g: &Geometry, sampler: &Sampler, at: [f64; 2]) -> f64 {
 }
 
 /// Values in consecutive bins.
-struct Bins {
-    first: i64,
-    values: Vec<f64>,
+pub struct Bins {
+    /// Number of the first bin.
+    pub first: i64,
+    /// One a bin.
+    pub values: Vec<f64>,
 }
 
 /// The bins that particles lie in, from `low` to `high`, no more than `most`.
@@ -150,8 +165,9 @@ fn range(low: f64, high: f64, dx: f64, most: i64) -> (i64, usize) {
     (first, (last - first + 1).clamp(1, 2 * most) as usize)
 }
 
-/// Volume per area. Every particle is spread evenly over one spacing, so that a bin's content changes smoothly.
-fn thickness(g: &Geometry, rows: &Rows) -> Bins {
+/// Volume per area, of the rows that count, in the bins that all rows need. Every particle is spread evenly over one spacing,
+/// so that a bin's content changes smoothly.
+pub fn thickness_of(g: &Geometry, rows: &Rows, counts: impl Fn(usize) -> bool) -> Bins {
     let along = || rows.position.iter().map(|&x| g.along(x));
     let (low, high) = along().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s), h.max(s)));
     // No bins behind a wall: what is spread beyond it, or has sunk into it, belongs to the bin before it.
@@ -160,7 +176,7 @@ fn thickness(g: &Geometry, rows: &Rows) -> Bins {
     let high = (high.max(low) + 0.499 * g.dx).min(highest);
     let (first, count) = range(low, high, g.dx, MOST_BINS[0]);
     let mut values = vec![0.0; count];
-    for (row, s) in along().enumerate() {
+    for (row, s) in along().enumerate().filter(|(row, _)| counts(*row)) {
         let volume = rows.mass[row] / rows.density[row];
         let left = s / g.dx - 0.5 - first as f64;
         let (k, part) = (left.floor(), left - left.floor());
@@ -197,6 +213,12 @@ fn fronts(g: &Geometry, rows: &Rows, profile: &Profile) -> Fronts {
     let furthest = order.last().map_or(0.0, |f| f.0) + 0.5 * g.dx;
     // A bin counts as filled as a whole, so the edge could lie beyond the last particle.
     Fronts { furthest, mass, thickness: edge(g, profile).min(furthest) }
+}
+
+fn strays(g: &Geometry, rows: &Rows, front: f64) -> Strays {
+    let beyond = rows.position.iter().zip(&rows.mass).filter(|(x, _)| g.along(**x) > front);
+    let (count, mass) = beyond.fold((0, 0.0), |(n, sum), (_, m)| (n + 1, sum + m));
+    Strays { count, share: mass / rows.mass.iter().sum::<f64>() }
 }
 
 /// From the bin that holds most volume outward to the first one thinner than half a spacing; that one counts by
@@ -348,6 +370,8 @@ mod tests {
         assert!((after.fronts.furthest - 0.505).abs() < 1e-12);
         assert_eq!(before.fronts.thickness, after.fronts.thickness);
         assert_eq!(before.height_max, after.height_max);
+        assert_eq!(before.strays, Strays::default());
+        assert!(after.strays.count == 1 && after.strays.share > 0.0, "{:?}", after.strays);
         assert!((after.fronts.mass - before.fronts.mass).abs() < g.dx);
     }
 

@@ -1,27 +1,33 @@
 //! `sph-post`: from the snapshots of a run to numbers (`post/results.nc`, `post/history.nc`) and pictures.
 //!
 //! Serial: one snapshot is in memory at a time, and of several ranks one works. [`geometry`] says what the scene means for the evaluation,
-//! [`sample`] gives fields at any point, [`deposit`], [`basal`] and [`energy`] evaluate one snapshot,
-//! [`analysis`] goes through the run, [`netcdf`], [`plot`] and [`report`] show what it found.
+//! [`sample`] gives fields at any point, [`deposit`], [`basal`], [`dip`], [`energy`], [`layers`], [`section`], [`flow`] and
+//! [`failure_plane`] evaluate one snapshot, [`analysis`] goes through the run, [`partition`] through its history, [`netcdf`], [`plot`] and [`report`] show what it found.
 
 pub mod analysis;
 pub mod basal;
 pub mod cli;
 pub mod deposit;
+pub mod dip;
 pub mod energy;
 pub mod failure;
+pub mod failure_plane;
+pub mod flow;
 pub mod geometry;
 pub mod history;
+pub mod layers;
 pub mod netcdf;
+pub mod partition;
 pub mod plot;
 pub mod report;
 pub mod sample;
 pub mod scatter;
+pub mod section;
 pub mod summary;
 #[cfg(test)]
 mod testing;
 
-use analysis::Analysis;
+use analysis::{Analysis, Choices};
 use clap::Parser;
 use cli::Arguments;
 use failure::Failure;
@@ -81,7 +87,13 @@ fn say(message: std::fmt::Arguments<'_>) {
 /// Evaluates the run and returns the paths of what it wrote.
 fn evaluate(arguments: &Arguments) -> Result<Vec<PathBuf>, Failure> {
     let folder = RunFolder::new(&arguments.run);
-    let analysis = Analysis::of(&folder, arguments.basal_height)?;
+    let choices = Choices {
+        basal_height: arguments.basal_height,
+        layers: arguments.layers.into(),
+        static_speed: arguments.static_speed,
+        failure_time: arguments.failure_time,
+    };
+    let analysis = Analysis::of(&folder, choices)?;
     let post = folder.post();
     std::fs::create_dir_all(&post).map_err(|error| FileError::writing(&post, 0, &error))?;
     let mut paths = vec![post.join("results.nc")];

@@ -222,6 +222,11 @@ fn solve(matrix: &[[f64; 3]; 3], right: [f64; 3], axes: &[usize]) -> Option<[f64
 }
 
 impl Stencil {
+    /// The value of a scalar field, which images share.
+    pub fn even(&self, field: &[f64]) -> f64 {
+        self.rows.iter().map(|&(row, _, w)| w * field[row as usize]).sum()
+    }
+
     /// The value of a symmetric tensor field, XX YY ZZ XY YZ XZ; images carry the mirrored tensor.
     pub fn symmetric(&self, field: &[[f64; 6]]) -> [f64; 6] {
         let mut sum = [0.0; 6];

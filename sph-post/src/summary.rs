@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 ///
 /// Whether it has come to rest: `front_mass_last_T` is the change of the 99.5 % front during the last T = sqrt(H0/g), in
 /// r0, null where run-outs are or the run is shorter than T; `kinetic_over_peak` is the kinetic energy at the end over its
-/// peak. Both come from the history where there is one, since it is finer than the snapshots.
+/// peak. Both come from the history where there is one, since it is finer than the snapshots. `energy_closure` and
+/// `dissipated_share` are there only where the history tells the work that was done ([`crate::partition::Partition`]).
 ///
 /// # Errors
 /// Whatever can't be written.
@@ -24,7 +25,12 @@ pub fn write(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 fn json(a: &Analysis) -> serde_json::Value {
     let last = a.last();
     let fronts = &last.deposit.fronts;
-    serde_json::json!({
+    let outward = a.geometry.runs_outward;
+    let failure = a.failure.map(|k| &a.moments[k]);
+    let line = failure.and_then(|m| m.failure_plane.line);
+    let potential = a.start_potential();
+    let [on_axis, off_axis] = last.basal.dips;
+    let mut numbers = serde_json::json!({
         "title": a.scene.title,
         "scene_hash": a.hash,
         "final_time_s": last.time,
@@ -36,6 +42,10 @@ fn json(a: &Analysis) -> serde_json::Value {
         "runout_furthest": a.scaled(fronts.furthest),
         "runout_mass_99_5": a.scaled(fronts.mass),
         "runout_thickness": a.scaled(fronts.thickness),
+        "runout_true": a.scaled(fronts.furthest),
+        "runout_effective": a.scaled(fronts.thickness),
+        "stray_particles": outward.then_some(last.deposit.strays.count),
+        "stray_mass_share": outward.then_some(last.deposit.strays.share),
         "final_height_m": last.deposit.height_centre,
         "max_height_m": last.deposit.height_max,
         "volume_ratio": last.deposit.volume_ratio,
@@ -43,7 +53,33 @@ fn json(a: &Analysis) -> serde_json::Value {
         "kinetic_over_peak": kinetic_over_peak(a),
         "basal_level_m": a.level,
         "basal_force_over_weight": last.basal.ratio(),
-    })
+        "basal_centre_ratio": on_axis.ratio,
+        "basal_max_distance_m": on_axis.radius,
+        "basal_centre_ratio_off_axis": off_axis.ratio,
+        "basal_max_distance_off_axis_m": off_axis.radius,
+        "static_speed_m_s": a.static_speed,
+        "static_share": last.flow.share,
+        "failure_time_s": failure.map(|m| m.time),
+        "failure_angle_deg": line.map(|l| l.angle_deg),
+        "failure_scatter_m": line.map(|l| l.scatter),
+        "mechanical_loss_share": mechanical_loss(a, potential),
+    });
+    if let Some(partition) = &a.partition {
+        numbers["energy_closure"] = partition.error().into();
+        numbers["dissipated_share"] = partition.dissipated(potential).into();
+    }
+    numbers
+}
+
+/// Potential energy of the start that is neither potential nor kinetic at the end, over that of the start (Szewc 2017,
+/// Eq 31): dissipated, but for what is stored. NaN where it began on the floor.
+fn mechanical_loss(a: &Analysis, potential: f64) -> f64 {
+    let [high, fast] =
+        [series(a, "potential_energy", |m| m.energy.potential), series(a, "kinetic_energy", |m| m.energy.kinetic)];
+    match (high.first(), high.last(), fast.last()) {
+        (Some(start), Some(end), Some(speed)) if potential > 0.0 => (start[1] - end[1] - speed[1]) / potential,
+        _ => f64::NAN,
+    }
 }
 
 /// A quantity over time: from a column of the history, else from the snapshots.

@@ -310,6 +310,42 @@ pub fn legend(area: &Area, x: f64, y: f64, entries: &[Entry]) -> Drawn {
     Ok(())
 }
 
+/// A line through places in pixels, in dashes of 9 pixels with gaps of 6 if so wanted.
+pub fn polyline(area: &Area, points: &[(f64, f64)], style: ShapeStyle, dashed: bool) -> Drawn {
+    if points.len() < 2 {
+        return Ok(());
+    }
+    if !dashed {
+        return Ok(area.draw(&PathElement::new(points.iter().map(|p| place(p.0, p.1)).collect::<Vec<_>>(), style))?);
+    }
+    let mut gone = 0.0;
+    for ends in points.windows(2) {
+        let (a, b) = (ends[0], ends[1]);
+        let length = (b.0 - a.0).hypot(b.1 - a.1);
+        let at = |t: f64| place(a.0 + (b.0 - a.0) * t / length, a.1 + (b.1 - a.1) * t / length);
+        let mut begin = -(gone % 15.0);
+        while begin < length {
+            let (from, to) = (begin.max(0.0), (begin + 9.0).min(length));
+            if to > from {
+                area.draw(&PathElement::new(vec![at(from), at(to)], style))?;
+            }
+            begin += 15.0;
+        }
+        gone += length;
+    }
+    Ok(())
+}
+
+/// Colours and what they mean, as filled squares, from (x, y) downward.
+pub fn swatches(area: &Area, x: f64, y: f64, entries: &[(RGBColor, String)]) -> Drawn {
+    for (k, (colour, text)) in entries.iter().enumerate() {
+        let y = y + 20.0 * k as f64;
+        area.draw(&Rectangle::new([place(x, y - 6.5), place(x + 13.0, y + 6.5)], colour.filled()))?;
+        write(area, text, x + 20.0, y, style(SMALL, HPos::Left, VPos::Center))?;
+    }
+    Ok(())
+}
+
 /// A curve through the points with finite coordinates.
 pub fn curve(chart: &mut Axes, points: &[(f64, f64)], style: ShapeStyle) -> Drawn {
     let finite: Vec<(f64, f64)> = points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite()).collect();

@@ -1,10 +1,19 @@
 //! Pictures: SVG and PNG of the same drawing, side by side in `post/`.
 
 mod basal;
+mod basal_normalised;
 mod canvas;
+mod energies;
+mod failure_plane;
+mod flow;
+mod layers;
+mod panels;
 mod particles;
 mod profiles;
+mod runout;
 mod series;
+mod stress;
+mod surfaces;
 mod top_view;
 
 use crate::{analysis::Analysis, failure::Failure};
@@ -16,7 +25,22 @@ use std::path::{Path, PathBuf};
 /// Where a picture can't be written.
 pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut paths = Vec::new();
-    for draw in [profiles::draw, series::draw, particles::draw, top_view::draw, basal::draw] {
+    let all = [
+        profiles::draw,
+        surfaces::draw,
+        runout::draw,
+        series::draw,
+        energies::draw,
+        particles::draw,
+        layers::draw,
+        flow::draw,
+        failure_plane::draw,
+        top_view::draw,
+        stress::draw,
+        basal::draw,
+        basal_normalised::draw,
+    ];
+    for draw in all {
         paths.extend(draw(analysis, folder)?);
     }
     Ok(paths)

@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 const CURVES: usize = 21;
 
 /// Largest size of the part inside the axes, pixels, and smallest.
-const MOST: [f64; 2] = [820.0, 620.0];
-const LEAST: [f64; 2] = [360.0, 160.0];
+pub const MOST: [f64; 2] = [820.0, 620.0];
+pub const LEAST: [f64; 2] = [360.0, 160.0];
 
 /// Draws `profiles.svg` and `.png`.
 pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
@@ -81,7 +81,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 
 /// The surface as a curve in units of `unit`: through the middle of every bin, down to the floor at the outer edge of
 /// the last one before a gap: single particles further out are no surface.
-fn outline(g: &Geometry, profile: &Profile, unit: f64) -> Vec<(f64, f64)> {
+pub fn outline(g: &Geometry, profile: &Profile, unit: f64) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = profile.bins(g).map(|(x, k)| (x / unit, profile.height[k] / unit)).collect();
     let highest = (0..points.len()).max_by(|&a, &b| points[a].1.total_cmp(&points[b].1)).unwrap_or(0);
     let gap = |k: &usize| points[*k].1 == 0.0;

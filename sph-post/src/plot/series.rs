@@ -22,7 +22,9 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let (fronts, fronts_name) = fronts(a, times.unit);
     let (energies, energies_name) = energies(a, times.unit);
     let reference = a.geometry.cylinder_aspect.map(laws::lube_runout);
-    let last = (a.last().time / times.unit).max(1e-9);
+    // A history may be ahead of the snapshots, while the run goes on.
+    let ends = [Some(a.last().time), a.history.as_ref().and_then(|h| h.times().last().copied())];
+    let last = (ends.into_iter().flatten().fold(0.0, f64::max) / times.unit).max(1e-9);
     let left = MARGIN[0] + 8.0;
     let tops = [56.0, 56.0 + INNER[1] + MARGIN[1] + 22.0];
     let paper = [(left + INNER[0] + 250.0) as i32, (tops[1] + INNER[1] + MARGIN[1] + 8.0) as i32];
@@ -71,9 +73,9 @@ fn fronts(a: &Analysis, unit: f64) -> (Vec<Curve>, String) {
         (false, false) => "x (m)",
     };
     let curves = vec![
-        ("furthest particle", curve(&|f| f.furthest)),
+        ("true: furthest particle", curve(&|f| f.furthest)),
         ("99.5 % of the mass", curve(&|f| f.mass)),
-        ("thickness \u{2265} dx/2", curve(&|f| f.thickness)),
+        ("effective: thickness \u{2265} dx/2", curve(&|f| f.thickness)),
     ];
     (curves, name.into())
 }

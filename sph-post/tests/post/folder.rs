@@ -192,7 +192,7 @@ pub fn hydrostatic(scene: &Scene, rows: &mut Rows) {
     }
 }
 
-/// Eleven snapshots and a history of a column that turns into a cone (a wedge in plane strain), filled anew with
+/// Eleven snapshots and a history, in which energies add up, of a column that turns into a cone (a wedge in plane strain), filled anew with
 /// particles at each time: no mechanics, but all that pictures need.
 pub fn spreading(made: &Made) {
     let (start, end) = (block(&made.scene), 4.0 * (0.1_f64 / 9.81).sqrt());
@@ -200,11 +200,15 @@ pub fn spreading(made: &Made) {
     for k in 0..=10_u64 {
         made.snapshot(k, 0.1 * k as f64 * end, 100 * k, &frustum(&made.scene, 0.1 * k as f64));
     }
-    let mut text = String::from("time [s],step [1],kinetic_energy [J],potential_energy [J],elastic_energy [J]\n");
+    let mut text = String::from(
+        "time [s],step [1],kinetic_energy [J],potential_energy [J],elastic_energy [J],stress_work [J],viscous_work [J]\n",
+    );
     for k in 0..=100 {
         let s = f64::from(k) / 100.0;
         let (kinetic, potential) = (2.0 * (s * (1.0 - s)).powi(2), 1.0 - 0.5 * s * s * (3.0 - 2.0 * s));
-        let _ = writeln!(text, "{:e},{k},{kinetic:e},{potential:e},{:e}", s * end, 1e-4);
+        let lost = 1.0 - kinetic - potential;
+        let (stress, viscous) = (0.9 * lost, 0.1 * lost);
+        let _ = writeln!(text, "{:e},{k},{kinetic:e},{potential:e},{:e},{stress:e},{viscous:e}", s * end, 1e-4);
     }
     std::fs::write(made.run.history(), text).unwrap();
 }
@@ -248,6 +252,8 @@ fn frustum(scene: &Scene, way: f64) -> Rows {
                 rows.mass.push(2600.0 * volume);
                 rows.density.push(2600.0);
                 rows.stress.push([0.45 * p, 0.45 * p, p, 0.0, 0.2 * p * x[1] / base, 0.2 * p * x[0] / base]);
+                rows.stress_work.push(0.0);
+                rows.viscous_work.push(0.0);
                 rows.plastic_strain.push(s);
             }
         }

@@ -87,8 +87,23 @@ fn everything_is_written_and_told() {
         let called = post(made.run.path(), &["--basal-height", "8 mm"]);
         assert_eq!(called.code, Some(exit::DONE), "{}", called.err);
         let mut names = vec!["results.nc", "history.nc", "summary.json", "profile_final.csv"];
-        let pictures = ["profiles", "time-series", "particles", "basal-stress", "top-view"];
-        let of_space = &pictures[..if scene.name == "3d" { 5 } else { 4 }];
+        let pictures = [
+            "profiles",
+            "surfaces",
+            "run-out",
+            "time-series",
+            "energies",
+            "particles",
+            "layers-horizontal",
+            "layers-vertical",
+            "static",
+            "static-share",
+            "stress-sections",
+            "basal-stress",
+            "basal-stress-normalised",
+            "top-view",
+        ];
+        let of_space = &pictures[..pictures.len() - usize::from(scene.name != "3d")];
         let files: Vec<String> = of_space.iter().flat_map(|p| ["svg", "png"].map(|k| format!("{p}.{k}"))).collect();
         names.extend(files.iter().map(String::as_str));
         for name in &names {
@@ -115,6 +130,15 @@ fn everything_is_written_and_told() {
         let last = summary["front_mass_last_T"].as_f64().unwrap();
         assert!(last > 0.05 && last < summary["runout_mass_99_5"].as_f64().unwrap(), "{last}");
         assert!((summary["volume_ratio"].as_f64().unwrap() - 1.0).abs() < 1e-12);
+        // The energies of the made-up history add up, but for rounding: half of the potential energy is gone at the end.
+        assert!(summary["energy_closure"].as_f64().unwrap().abs() < 1e-14, "{}", summary["energy_closure"]);
+        let [dissipated, lost] = ["dissipated_share", "mechanical_loss_share"].map(|k| summary[k].as_f64().unwrap());
+        close(dissipated, 0.5, 1e-12, "dissipated");
+        close(lost, 0.5, 1e-12, "lost");
+        let from_history = |name: &str| results::read(&made.run.post().join("history.nc"), name).unwrap();
+        close(from_history("plastic_work")[100], 0.45, 1e-12, "plastic work");
+        close(from_history("viscous_work")[100], 0.05, 1e-12, "viscous work");
+        assert!(from_history("energy_closure").iter().all(|e| e.abs() < 1e-14));
         // Twice the same: same bits.
         let before = std::fs::read(made.run.post().join("profiles.svg")).unwrap();
         assert_eq!(post(made.run.path(), &["--basal-height", "8 mm", "--quiet"]).err, "");
@@ -127,6 +151,79 @@ fn everything_is_written_and_told() {
             }
         }
     }
+}
+
+/// A block under its own weight, whose outer part slides at 1 m/s down a plane that rises at 60 degrees from the toe.
+#[test]
+fn what_lies_inside_has_known_numbers() {
+    for scene in SCENES {
+        let made = Made::new(scene.text);
+        let mut rows = block(&made.scene);
+        hydrostatic(&made.scene, &mut rows);
+        made.initial(&rows);
+        let (dx, what) = (made.scene.spacing, scene.name);
+        let (sin, cos) = 60_f64.to_radians().sin_cos();
+        let outside = |r: f64, z: f64| (r - 0.1) * sin + z * cos;
+        for (v, x) in rows.velocity.iter_mut().zip(&rows.position) {
+            let speed = (0.5 + outside(x[0].hypot(x[1]), x[2]) / (4.0 * dx)).clamp(0.0, 1.0);
+            *v = [speed * cos, 0.0, -speed * sin];
+        }
+        made.snapshot(0, 0.0, 0, &rows);
+        let called = post(made.run.path(), &["--layers", "4", "--static-speed", "50 cm/s", "--failure-time", "1 ms"]);
+        assert_eq!(called.code, Some(exit::DONE), "{}", called.err);
+        let summary: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(made.run.post().join("summary.json")).unwrap()).unwrap();
+        let number = |name: &str| summary[name].as_f64().unwrap();
+        assert!((read(&made.run, "failure_angle")[0] - 60.0).abs() < 1.0, "{what}: {summary:#}");
+        assert_eq!(number("failure_angle_deg"), read(&made.run, "failure_angle")[0]);
+        assert_eq!((number("failure_time_s"), number("static_speed_m_s")), (0.0, 0.5));
+        assert!(made.run.post().join("failure-plane.png").is_file() && called.err.contains("failure plane"));
+        close(read(&made.run, "failure_top_speed")[0], 1.0, 1e-9, what);
+        // The surface of a tenth of the top speed, and that of half of it, are 1.6 spacings apart.
+        let surface = read(&made.run, "failure_surface");
+        for j in [4, 8, 12] {
+            let z = (f64::from(j) + 0.5) * dx;
+            let distance = outside(surface[j as usize], z);
+            assert!((distance + 1.6 * dx).abs() < 0.5 * dx, "{what} {j}: {} spacings", distance / dx);
+        }
+        let bins = read(&made.run, if scene.name == "plane-strain" { "x" } else { "r" });
+        let still = read(&made.run, "static_height");
+        for k in [bins.len() / 2, 2 * bins.len() / 3] {
+            let distance = outside(bins[k], still[k]);
+            assert!(distance.abs() < 0.5 * dx, "{what} {k}: {} spacings", distance / dx);
+        }
+        let tops = read(&made.run, "layer_top");
+        for (n, tops) in tops.chunks(bins.len()).enumerate() {
+            close(tops[bins.len() / 2], 0.025 * (n + 1) as f64, 0.05, what);
+        }
+        assert_eq!((tops.len(), read(&made.run, "layer").len()), (4 * bins.len(), 4));
+        let stress = read(&made.run, "section_stress_zz");
+        let z = read(&made.run, "z");
+        for j in 0..z.len() - 1 {
+            close(stress[j * bins.len() + bins.len() / 2], -2600.0 * 9.81 * (0.1 - z[j]), 1e-9, what);
+        }
+        let top_of_scale = stress.iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::min);
+        close(top_of_scale, -2600.0 * 9.81 * (0.1 - z[0]), 1e-6, what);
+        // There is no history, nor a column that says what work was done.
+        assert!(summary["energy_closure"].is_null() && !made.run.post().join("energies.png").exists());
+        assert_eq!((number("stray_particles"), number("runout_effective")), (0.0, number("runout_thickness")));
+    }
+}
+
+#[test]
+fn histories_of_older_runs_are_read_too() {
+    let made = Made::new(SCENES[0].text);
+    made.initial(&block(&made.scene));
+    let text = "time [s],step [1],kinetic_energy [J],potential_energy [J],elastic_energy [J]\n0,0,0,2,0\n1,9,1,0.5,0\n";
+    std::fs::write(made.run.history(), text).unwrap();
+    let called = post(made.run.path(), &["--quiet"]);
+    assert_eq!((called.code, called.err.as_str()), (Some(exit::DONE), ""));
+    let summary: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(made.run.post().join("summary.json")).unwrap()).unwrap();
+    assert!(summary.get("energy_closure").is_none() && summary.get("dissipated_share").is_none());
+    assert_eq!(summary["mechanical_loss_share"].as_f64(), Some(0.25));
+    let history = made.run.post().join("history.nc");
+    assert!(results::read(&history, "plastic_work").is_err() && results::read(&history, "kinetic_energy").is_ok());
 }
 
 #[test]

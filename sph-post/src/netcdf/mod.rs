@@ -1,5 +1,7 @@
 //! What the result files say: names, units and meaning of every variable.
 
+mod inside;
+
 use crate::{
     analysis::{Analysis, Moment},
     deposit::Fronts,
@@ -10,11 +12,12 @@ use formats::results::{Dataset, Role, Variable};
 /// What the methods are taken from.
 const REFERENCES: &str = "Surface: filled fraction sum(V W) = 1/2. Interpolation: first-order weighted least squares \
 (Liu and Liu 2003). Reference run-out and height: Lube et al. 2004, J. Fluid Mech. 508, 175-199, through Yang et al. 2020, \
-Eqs 45 and 46, of whose two heights the lower is taken";
+Eqs 45 and 46, of whose two heights the lower is taken. True and effective front, layers, basal stress: Yang et al. 2020, \
+sections 3.8 to 3.12. Failure plane and energies: Szewc 2017, sections 5.4 and 5.5";
 
 /// `post/results.nc`: everything the snapshots show, over time `t`.
 pub fn results(a: &Analysis) -> Dataset {
-    let mut d = common(a, "deposit, basal stresses and energies from snapshots", 1);
+    let mut d = common(a, "deposit, inside, stresses and energies from snapshots", 1);
     let times: Vec<f64> = a.moments.iter().map(|m| m.time).collect();
     d.dimension("t", times.len());
     d.variable(time(times));
@@ -39,6 +42,14 @@ pub fn history(a: &Analysis, history: &History) -> Dataset {
             &cf_unit(&column.unit),
             column.values.clone(),
         ));
+    }
+    if let Some(partition) = &a.partition {
+        let unit =
+            history.columns.iter().find(|c| c.name == "stress_work").map_or_else(String::new, |c| cf_unit(&c.unit));
+        let long = "work of the stresses less what the material stores: dissipated by it";
+        d.variable(Variable::new("plastic_work", Role::Data, &["t"], long, &unit, partition.plastic.clone()));
+        let long = "change of kinetic, potential, stress and viscous work together, over the largest change of potential energy";
+        d.variable(Variable::new("energy_closure", Role::Data, &["t"], long, "1", partition.closure.clone()));
     }
     d
 }
@@ -71,7 +82,7 @@ fn common(a: &Analysis, what: &str, time_chunk: usize) -> Dataset {
     let g = &a.geometry;
     let mut d = Dataset { time_chunk, ..Dataset::default() };
     d.attribute("title", format!("{}: {what}", a.scene.title));
-    d.attribute("source", "smoothed particle hydrodynamics, elastic-plastic granular material");
+    d.attribute("source", "smoothed particle hydrodynamics of granular material");
     d.attribute("history", concat!("written by sph-post ", env!("CARGO_PKG_VERSION")));
     d.attribute("references", REFERENCES);
     d.attribute("space", g.space.name());
@@ -110,14 +121,37 @@ fn series(a: &Analysis, d: &mut Dataset) {
     let scaled = "relative to the initial extent, (front - r0)/r0; missing with several bodies, and where the body can \
                   spread both ways or runs towards -x";
     for (name, what, pick) in [
-        ("furthest", "furthest particle and half a spacing", (|f| f.furthest) as fn(&Fronts) -> f64),
+        (
+            "furthest",
+            "true front, that of stray particles: furthest particle and half a spacing",
+            (|f| f.furthest) as fn(&Fronts) -> f64,
+        ),
         ("mass", "contains 99.5 percent of the mass", |f| f.mass),
-        ("thickness", "edge where the thickness is half a spacing", |f| f.thickness),
+        (
+            "thickness",
+            "effective front, that of the deposit without a gap: edge where the thickness is half a spacing",
+            |f| f.thickness,
+        ),
     ] {
         add(&format!("front_{name}"), &format!("front, {from}: {what}"), "m", &|m| pick(&m.deposit.fronts));
         let value = |m: &Moment| a.scaled(pick(&m.deposit.fronts));
         add(&format!("runout_{name}"), &format!("run-out: {what}, {scaled}"), "1", &value);
     }
+    let outward = a.geometry.runs_outward;
+    let stray = |value: f64| if outward { value } else { f64::NAN };
+    add("stray_particles", "particles beyond the effective front", "1", &|m| stray(m.deposit.strays.count as f64));
+    add("stray_share", "mass of the particles beyond the effective front over that of all", "1", &|m| {
+        stray(m.deposit.strays.share)
+    });
+    add("static_share", "volume of the particles slower than static_speed over that of all", "1", &|m| m.flow.share);
+    let plane = "failure plane, through the places where the speed is a tenth of failure_top_speed";
+    add("failure_angle", &format!("inclination to the horizontal of the {plane}"), "degree", &|m| {
+        m.failure_plane.line.map_or(f64::NAN, |l| l.angle_deg)
+    });
+    add("failure_scatter", &format!("root mean square distance of the places from the {plane}"), "m", &|m| {
+        m.failure_plane.line.map_or(f64::NAN, |l| l.scatter)
+    });
+    add("failure_top_speed", "largest speed of the material, strays left out", "m s-1", &|m| m.failure_plane.top_speed);
     add("height_centre", "largest height within two spacings of the centre", "m", &|m| m.deposit.height_centre);
     add("height_max", "largest height of the surface", "m", &|m| m.deposit.height_max);
     add("volume_ratio", "volume over the volume at the start", "1", &|m| m.deposit.volume_ratio);
@@ -128,6 +162,15 @@ fn series(a: &Analysis, d: &mut Dataset) {
     let newton = format!("N{per}");
     add("basal_force", "integral of the normal stress at the basal height", &newton, &|m| m.basal.force);
     add("weight_above", "weight of the material above the basal height", &newton, &|m| m.basal.weight);
+    for (k, (suffix, what)) in
+        [("", "within 2h"), ("_off_axis", "between 2h and 4h, all nearer left out")].into_iter().enumerate()
+    {
+        let long = format!("pressure at the basal height in the centre ({what}) over the largest");
+        add(&format!("basal_centre_ratio{suffix}"), &long, "1", &|m| m.basal.dips[k].ratio);
+        let long =
+            format!("distance from the centre of the largest pressure at the basal height, for the centre {what}");
+        add(&format!("basal_max_distance{suffix}"), &long, "m", &|m| m.basal.dips[k].radius);
+    }
     add("step", "steps done", "1", &|m| m.step as f64);
 }
 
@@ -160,14 +203,8 @@ fn profiles(a: &Analysis, d: &mut Dataset) {
     coordinate(a, d, name, long, first, count);
     let mut add =
         |variable: &str, long: &str, unit: &str, method: &str, outside: f64, field: &dyn Fn(&Moment) -> &[f64]| {
-            let mut values = Vec::with_capacity(a.moments.len() * count);
-            for m in &a.moments {
-                let skip = (m.deposit.profile.first - first) as usize;
-                let row = field(m);
-                values.extend(
-                    (0..count).map(|k| k.checked_sub(skip).and_then(|k| row.get(k)).copied().unwrap_or(outside)),
-                );
-            }
+            let row = |m: &Moment| over_bins(m.deposit.profile.first, field(m), first, count, outside);
+            let values = a.moments.iter().flat_map(row).collect();
             let v = Variable::new(variable, Role::Data, &["t", name], long, unit, values);
             d.variable(v.with("cell_methods", format!("{name}: {method}")));
         };
@@ -187,6 +224,13 @@ fn profiles(a: &Analysis, d: &mut Dataset) {
     add("basal_shear_stress", shear, "Pa", method, none, &|m| &m.basal.profile.shear);
     let hydrostatic = "weight of the column above the basal height over its area, as a normal stress";
     add("hydrostatic_stress", hydrostatic, "Pa", method, none, &|m| &m.basal.profile.hydrostatic);
+    inside::inside(a, d, first, count);
+}
+
+/// A row of bins from `begin` on, over `count` bins from `first` on, which is no later.
+fn over_bins(begin: i64, row: &[f64], first: i64, count: usize, outside: f64) -> Vec<f64> {
+    let skip = (begin - first) as usize;
+    (0..count).map(move |k| k.checked_sub(skip).and_then(|k| row.get(k)).copied().unwrap_or(outside)).collect()
 }
 
 /// Height and basal stress over x and y, in 3-D.
