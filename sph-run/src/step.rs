@@ -47,7 +47,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         for i in 0..p.owned {
             p.x[i] = p.x[i] + p.v[i] * dt;
         }
-        self.mirrors.keep_inside::<D, N, P::Space>(p);
+        self.periods.round(&mut p.x[..p.owned]);
+        self.mirrors.keep_inside(p);
     }
 
     /// Density and stress of the owned particles, from the velocity gradient.
