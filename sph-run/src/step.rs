@@ -45,9 +45,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     fn drift(&mut self, dt: f64) {
         let p = &mut self.particles;
         for i in 0..p.owned {
-            p.x[i] = p.x[i] + p.v[i] * dt;
+            p.x[i] = p.x[i] + self.periods.rounded(p.v[i] * dt);
         }
-        self.periods.round(&mut p.x[..p.owned]);
         self.mirrors.keep_inside(p);
     }
 

@@ -18,13 +18,13 @@ impl<const D: usize> Periods<D> {
         Self((0..3).filter_map(|axis| Some((S::axis(axis)?, scene.periodic_axis(axis)?))).collect())
     }
 
-    /// Rounds places to the quantum: whatever moves a particle must do so.
-    pub fn round(&self, x: &mut [Vector<D>]) {
+    /// A displacement rounded to the quantum: whatever moves a particle adds one of these, which is exact. (A rounding
+    /// after the addition would depend on the side of the border.)
+    pub fn rounded(&self, mut x: Vector<D>) -> Vector<D> {
         for &(a, axis) in &self.0 {
-            for x in x.iter_mut() {
-                x.0[a] = axis.round(x.0[a]);
-            }
+            x.0[a] = axis.round(x.0[a]);
         }
+        x
     }
 
     /// Brings places back between the ends.
