@@ -5,6 +5,7 @@ use crate::parallel::gather;
 use crate::physics::Physics;
 use crate::report;
 use crate::simulation::Simulation;
+use crate::space::Space as _;
 use formats::folder::RunFolder;
 use formats::scene::Scene;
 use formats::schema::Kept;
@@ -33,7 +34,12 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
     /// This rank's share of all particles, in ascending id. Collective.
     pub fn rows(&self) -> Rows {
-        gather::rows::<D, N, P::Space>(self.comm, &self.particles, self.parameters.count)
+        let mut rows = gather::rows::<D, N, P::Space>(self.comm, &self.particles, self.parameters.count);
+        // Between builds of the lists particles may lie beyond a periodic border; when that is must not show.
+        for x in &mut rows.position {
+            *x = P::Space::to_disk(self.periods.wrapped(P::Space::from_disk(*x)));
+        }
+        rows
     }
 
     /// Writes a particle file. Collective.

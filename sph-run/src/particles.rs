@@ -5,12 +5,13 @@ use crate::material::History;
 use crate::space::Space;
 use formats::snapshot::Rows;
 
-/// Bits of a key that name the mirror image; 0 is the particle itself.
-const IMAGE_BITS: u32 = 2;
+/// Bits of a key that name the mirror image, for each of the axes x y z; 0 is the particle itself.
+pub const IMAGE_BITS_PER_AXIS: u32 = 3;
+const IMAGE_BITS: u32 = 3 * IMAGE_BITS_PER_AXIS;
 
 /// Key of a material particle or of one of its mirror images: ascending keys are the order of every sum over
-/// neighbours. Wall particles carry the keys of [`formats::scene::WallLattice::id`], above all of these.
-pub fn key(id: u64, image: u8) -> u64 {
+/// neighbours. A periodic copy has the key of its original, because no particle can reach both. Ids are below 2^54. Wall particles carry the keys of [`formats::scene::WallLattice::id`], above all of these.
+pub fn key(id: u64, image: u16) -> u64 {
     id << IMAGE_BITS | u64::from(image)
 }
 

@@ -94,7 +94,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Totals of the present state. Collective.
     pub fn totals(&self, scales: &Scales) -> Line {
         let (p, par) = (&self.particles, &self.parameters);
-        let place = |i: usize| P::Space::to_disk(p.x[i]);
+        let place = |i: usize| P::Space::to_disk(self.periods.wrapped(p.x[i]));
         let distance = |x: [f64; 3]| if scales.radial { (x[0] * x[0] + x[1] * x[1]).sqrt() } else { x[0] };
 
         let mut extremes = [f64::NEG_INFINITY; 6];
@@ -117,7 +117,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         for i in 0..p.owned {
             let volume = p.mass[i] / p.density[i];
             sums[0].add(0.5 * p.mass[i] * p.v[i].norm2());
-            sums[1].add(-p.mass[i] * self.gravity.dot(p.x[i]));
+            sums[1].add(-p.mass[i] * self.gravity.dot(self.periods.wrapped(p.x[i])));
             let stress = P::Space::stress_to_disk(p.stress[i]);
             sums[2].add(p.mass[i] * scales.material.stored_energy(stress, p.density[i]));
             sums[3].add(p.mass[i] * p.work[i].stress);

@@ -1,8 +1,9 @@
 //! Everything one rank knows: its particles, what surrounds them, and where the run stands.
 
 use crate::algebra::{Matrix, Vector};
-use crate::boundary::field::Field;
-use crate::boundary::mirror::{Image, Mirrors};
+use crate::boundary::field::Spread;
+use crate::boundary::mirror::Mirrors;
+use crate::boundary::periodic::Periods;
 use crate::boundary::wall::Walls;
 use crate::material::Material as _;
 use crate::neighbors::{Neighbors, cell_order};
@@ -62,9 +63,9 @@ pub struct Clock {
 
 /// How the particles are shared out.
 #[derive(Debug)]
-pub struct Partition {
+pub struct Partition<const D: usize> {
     pub tree: Tree,
-    pub halo: Halo,
+    pub halo: Halo<D>,
     /// Particles of this rank when they had gone home to a new tree; none until then.
     planned: Option<u64>,
 }
@@ -78,11 +79,10 @@ pub struct Simulation<'a, const D: usize, const N: usize, P: Physics<D, N>> {
     pub clock: Clock,
     pub particles: Particles<D, N>,
     pub neighbors: Neighbors,
-    pub partition: Partition,
-    pub mirrors: Mirrors,
-    pub images: Vec<Image>,
+    pub partition: Partition<D>,
+    pub periods: Periods<D>,
+    pub mirrors: Mirrors<D, N>,
     pub walls: Walls,
-    has_walls: bool,
     /// Positions when the neighbour lists were built.
     pub x_build: Vec<Vector<D>>,
     pub gradient: Vec<Matrix<D>>,
@@ -97,7 +97,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         comm: &'a Communicator,
         scene: &Scene,
         material: P::Material,
-        particles: Particles<D, N>,
+        mut particles: Particles<D, N>,
         count: u64,
         clock: Clock,
     ) -> Self {
@@ -112,7 +112,8 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         let viscous_step = material
             .largest_viscosity()
             .map_or(f64::INFINITY, |largest| numerics.viscous_courant * scene.material.density() * h * h / largest);
-        let axisymmetric = scene.space == formats::space::Space::Axisymmetric;
+        let periods = Periods::new::<N, P::Space>(scene);
+        periods.wrap(&mut particles.x);
         let axes = scene.space.axes();
         let tree = Tree::build(particles.x.iter().map(|&x| P::Space::to_disk(x)), None, axes, comm);
         let mut simulation = Self {
@@ -137,10 +138,9 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
             particles,
             neighbors: Neighbors::default(),
             partition: Partition { tree, halo: Halo::default(), planned: None },
-            mirrors: Mirrors { planes: [scene.symmetry[0] || axisymmetric, scene.symmetry[1]] },
-            images: Vec::new(),
+            periods,
+            mirrors: Mirrors::new::<P::Space>(scene),
             walls: Walls::new(WallLattice::new(scene), dx.powi(D as i32)),
-            has_walls: !scene.walls.is_empty(),
             x_build: Vec::new(),
             gradient: Vec::new(),
             buffers: Buffers::default(),
@@ -153,6 +153,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
 
     /// Shares the particles out anew if the load has shifted, sends them home, and builds halo, boundaries and lists.
     pub fn rebuild(&mut self) {
+        self.periods.wrap(&mut self.particles.x[..self.particles.owned]);
         let now = self.particles.owned as u64;
         let mut shifted =
             [u64::from(self.always_rebalance || self.partition.planned.is_none_or(|then| changed(then, now)))];
@@ -177,16 +178,17 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         self.gradient.resize(self.particles.owned, Matrix::default());
 
         // A particle near a wall is needed twice as far: by the wall particles that others see.
-        let beside_wall = if self.has_walls { 2.0 * reach } else { reach };
+        let beside_wall = if self.walls.has_sites() { 2.0 * reach } else { reach };
         let walls = self.walls.clone();
         let reach_of = |x: Vector<D>| {
-            if walls.distance::<D, N, P::Space>(x) < reach { beside_wall } else { reach }
+            if walls.distance_of_sites::<D, N, P::Space>(x) < reach { beside_wall } else { reach }
         };
         self.refresh_volumes();
-        self.partition.halo = Halo::plan(self.comm, &mut self.particles, reach_of, beside_wall);
+        let shifts = self.periods.shifts();
+        self.partition.halo = Halo::plan(self.comm, &mut self.particles, shifts, reach_of, beside_wall);
         self.partition.halo.fill(self.comm, &mut self.particles, Fields::Motion);
-        self.images = self.mirrors.create::<D, N, P::Space>(&mut self.particles, reach_of);
-        Mirrors::fill_motion::<D, N, P::Space>(&mut self.particles, &self.images);
+        self.mirrors.create(&mut self.particles, reach_of);
+        self.mirrors.fill(&mut self.particles, Fields::Motion);
         self.walls.create::<D, N, P::Space>(&mut self.particles, reach);
         self.neighbors.build(&self.particles, reach);
         self.walls.fill_motion::<D, N, P::Space, P::Kernel>(
@@ -201,22 +203,21 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
     pub fn fill(&mut self, fields: Fields) {
         let p = &mut self.particles;
         self.partition.halo.fill(self.comm, p, fields);
+        self.mirrors.fill(p, fields);
         match fields {
             Fields::Motion => {
-                Mirrors::fill_motion::<D, N, P::Space>(p, &self.images);
                 self.walls.fill_motion::<D, N, P::Space, P::Kernel>(p, &self.neighbors, self.parameters.pairs);
             }
             Fields::Stress => {
-                Mirrors::fill_stress::<D, N, P::Space>(p, &self.images);
                 self.walls.fill_stress::<D, N, P::Space>(p, &self.neighbors);
             }
         }
     }
 
     /// Gives a field that only owned particles have to all copies and images of them, and zero to wall particles.
-    pub fn spread<T: Field<D, N>>(&mut self, field: &mut Vec<T>) {
-        self.partition.halo.spread(self.comm, self.particles.owned, field);
-        Mirrors::spread::<D, N, P::Space, T>(&self.particles, &self.images, field);
+    pub fn spread<T: Spread<D, N>>(&mut self, field: &mut Vec<T>) {
+        self.partition.halo.spread(self.comm, &self.particles, field);
+        self.mirrors.spread(&self.particles, field);
     }
 
     /// Volumes of the owned particles from mass, density and place.

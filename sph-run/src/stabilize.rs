@@ -181,7 +181,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             let pairs = self.parameters.pairs;
             shifting::shift::<D, N, P::Kernel>(&self.particles, &self.neighbors, pairs, strength, dt, &mut shift);
             for (x, shift) in self.particles.x.iter_mut().zip(&shift) {
-                *x += *shift;
+                *x += self.periods.rounded(*shift);
             }
             self.buffers.shift = shift;
         }

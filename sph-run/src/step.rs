@@ -62,9 +62,9 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     fn drift(&mut self, dt: f64) {
         let p = &mut self.particles;
         for i in 0..p.owned {
-            p.x[i] = p.x[i] + p.v[i] * dt;
+            p.x[i] = p.x[i] + self.periods.rounded(p.v[i] * dt);
         }
-        self.mirrors.keep_inside::<D, N, P::Space>(p);
+        self.mirrors.keep_inside(p);
     }
 
     /// Density and stress of the owned particles, from the velocity gradient.

@@ -1,10 +1,13 @@
 //! What surrounds the particles of a rank, against a search through everything: rows H3, H4 and H5 of the list of
-//! verification tests, on 1, 2, 3 and 5 ranks. The test starts itself again under mpirun.
+//! verification tests, on 1, 2, 3 and 5 ranks; with walls, planes of symmetry, mirror walls and periodic axes, and all of
+//! these across the borders of ranks. The test starts itself again under mpirun.
 
 use formats::h5::Communicator;
-use formats::scene::{Scene, WallLattice};
+use formats::scene::{Scene, WallKind, WallLattice};
+use formats::space::Space as Kind;
 use sph_run::algebra::Vector;
 use sph_run::dispatch::{Job, resolve};
+use sph_run::neighbors::bounds;
 use sph_run::parallel::Reduce;
 use sph_run::parallel::halo::Fields;
 use sph_run::particles::{Particles, id, key};
@@ -26,26 +29,52 @@ friction = "30 deg"
 cohesion = "0 Pa"
 [body.block]
 box = { min = [0, 0, 0], max = ["0.1 m", "0.1 m", "0.1 m"] }
-[wall.floor]
-axis = "z"
-at = "0 m"
-side = "above"
-slip = "no-slip"
-[wall.side]
-axis = "x"
-at = "0.13 m"
-side = "below"
-slip = "free-slip"
 [end]
 time = "1 s"
 "#;
 
-/// Space with planes of symmetry, and the cells of the block along x, y, z.
-const SCENES: [(&str, [usize; 3]); 3] = [
-    ("space = \"3d\"\nsymmetry = [\"x\", \"y\"]", [13, 8, 6]),
-    ("space = \"axisymmetric\"", [13, 1, 24]),
-    ("space = \"plane-strain\"\nsymmetry = [\"x\"]", [13, 1, 24]),
+const FLOOR: (&str, &str) = ("z", "side = \"above\"\nat = 0\nslip = \"no-slip\"");
+const SIDE: (&str, &str) = ("x", "side = \"below\"\nat = 0.13\nslip = \"free-slip\"");
+const MIRROR_FLOOR: (&str, &str) = ("z", "side = \"above\"\nat = 0\nslip = \"no-slip\"\nkind = \"mirror\"");
+const MIRROR_LEFT: (&str, &str) = ("x", "side = \"above\"\nat = 0\nslip = \"no-slip\"\nkind = \"mirror\"");
+const MIRROR_SIDE: (&str, &str) = ("x", "side = \"below\"\nat = 0.13\nslip = \"free-slip\"\nkind = \"mirror\"");
+/// Four spacings from a plane of symmetry, less than twice the reach: there are images of images.
+const MIRROR_NEAR: (&str, &str) = ("y", "side = \"below\"\nat = 0.04\nslip = \"free-slip\"\nkind = \"mirror\"");
+
+/// Space with planes of symmetry and periods; the cells of the block along x, y, z; the walls by their axes.
+type Trial = (&'static str, [usize; 3], &'static [(&'static str, &'static str)]);
+const SCENES: [Trial; 9] = [
+    ("space = \"3d\"\nsymmetry = [\"x\", \"y\"]", [13, 8, 6], &[FLOOR, SIDE]),
+    ("space = \"axisymmetric\"", [13, 1, 24], &[FLOOR, SIDE]),
+    ("space = \"plane-strain\"\nsymmetry = [\"x\"]", [13, 1, 24], &[FLOOR, SIDE]),
+    ("space = \"3d\"\nperiodic = { x = { from = 0, to = 0.13 }, y = { from = 0.02, to = 0.1 } }", [13, 8, 6], &[FLOOR]),
+    (
+        "space = \"3d\"\nsymmetry = [\"x\"]\nperiodic = { y = { from = 0, to = 0.08 } }",
+        [13, 8, 6],
+        &[MIRROR_FLOOR, SIDE],
+    ),
+    ("space = \"plane-strain\"\nperiodic = { x = { from = 0, to = 0.13 } }", [13, 1, 24], &[FLOOR]),
+    ("space = \"plane-strain\"", [13, 1, 24], &[MIRROR_FLOOR, MIRROR_LEFT, MIRROR_SIDE]),
+    ("space = \"axisymmetric\"", [13, 1, 24], &[MIRROR_FLOOR, MIRROR_SIDE]),
+    ("space = \"3d\"\nsymmetry = [\"y\"]", [16, 4, 8], &[FLOOR, MIRROR_NEAR]),
 ];
+
+fn scene((head, _, walls): Trial) -> Scene {
+    // A box has no y in the plane spaces, and a body of rings must be a cylinder.
+    let box_3d = r#"box = { min = [0, 0, 0], max = ["0.1 m", "0.1 m", "0.1 m"] }"#;
+    let mut text = format!("{head}{REST}");
+    if head.contains("axi") {
+        text = text.replace(box_3d, r#"cylinder = { radius = "0.1 m", height = "0.1 m" }"#);
+    } else if head.contains("plane") {
+        text = text.replace(box_3d, r#"box = { min = [0, 0, 0], max = ["0.1 m", 0, "0.1 m"] }"#);
+    } else if walls.contains(&MIRROR_NEAR) || head.contains("y = ") {
+        text = text.replace(box_3d, r#"box = { min = [0, 0.02, 0], max = ["0.1 m", "0.04 m", "0.1 m"] }"#);
+    }
+    for (number, (axis, wall)) in walls.iter().enumerate() {
+        text += &format!("[wall.number-{number}]\naxis = \"{axis}\"\n{wall}\n");
+    }
+    Scene::read("scene.toml", &text).expect("a sound scene")
+}
 
 #[test]
 fn everything_within_reach_is_there() {
@@ -69,21 +98,11 @@ fn everything_within_reach_is_there() {
         hook(info);
         mpi::traits::Communicator::abort(&mpi::topology::SimpleCommunicator::world(), 1);
     }));
-    for (head, cells) in SCENES {
-        // A box has no y in the plane spaces, and a body of rings must be a cylinder.
-        let rest = match head {
-            head if head.contains("axi") => REST.replace(
-                r#"box = { min = [0, 0, 0], max = ["0.1 m", "0.1 m", "0.1 m"] }"#,
-                r#"cylinder = { radius = "0.1 m", height = "0.1 m" }"#,
-            ),
-            head if head.contains("plane") => {
-                REST.replace(r#"["0.1 m", "0.1 m", "0.1 m"]"#, r#"["0.1 m", 0, "0.1 m"]"#)
-            }
-            _ => REST.to_owned(),
-        };
-        let scene = Scene::read("scene.toml", &format!("{head}{rest}")).expect("a sound scene");
-        for start in [Shares::AllOnTheFirst, Shares::InTurn] {
-            resolve(&scene, Check { comm: &comm, scene: &scene, cells, start });
+    for (number, trial) in SCENES.into_iter().enumerate() {
+        let scene = scene(trial);
+        let starts = [Shares::InTurn, Shares::AllOnTheFirst];
+        for start in starts.into_iter().take(if number < 3 { 2 } else { 1 }) {
+            resolve(&scene, Check { comm: &comm, scene: &scene, cells: trial.1, start });
         }
     }
 }
@@ -151,6 +170,7 @@ impl Job for Check<'_> {
 
         let count = x.len() as u64;
         let mut simulation = Simulation::<D, N, P>::new(self.comm, self.scene, material, mine, count, Clock::default());
+        simulation.periods.wrap(&mut x);
         let name = |what: &str| format!("{:?}, {size} ranks, rank {rank}, {:?}: {what}", self.scene.space, self.start);
         compare(&simulation, self.scene, &x, &name("at the start"));
 
@@ -159,9 +179,10 @@ impl Job for Check<'_> {
         let furthest = 0.4999 * simulation.parameters.skin;
         for round in 1..4 {
             let before = x.clone();
-            shift_all(&mut simulation, &mut x, &before, |n| shift(round, n, 3.0 * DX));
+            shift_all(&mut simulation, self.scene, &mut x, &before, |n| shift(round, n, 3.0 * DX));
             simulation.always_rebalance = round == 2;
             simulation.rebuild();
+            simulation.periods.wrap(&mut x);
             compare(&simulation, self.scene, &x, &name("after a migration"));
 
             let (built, owners) = (x.clone(), owners(&simulation, x.len()));
@@ -171,26 +192,38 @@ impl Job for Check<'_> {
                     by[axis] = if (owners[n] + round) % 2 == 0 { furthest } else { -furthest };
                     by
                 };
-                shift_all(&mut simulation, &mut x, &built, go);
+                shift_all(&mut simulation, self.scene, &mut x, &built, go);
                 simulation.fill(Fields::Motion);
                 compare(&simulation, self.scene, &x, &name("with lists about to go stale"));
             }
         }
         let before = x.clone();
         let centre = shift(7, 0, 0.05);
-        shift_all(&mut simulation, &mut x, &before, |n| {
+        shift_all(&mut simulation, self.scene, &mut x, &before, |n| {
             let place = P::Space::to_disk(before[n]);
             [0, 1, 2].map(|a| 0.3 * (centre[a].abs() - place[a]))
         });
         simulation.rebuild();
+        simulation.periods.wrap(&mut x);
         compare(&simulation, self.scene, &x, &name("pressed together"));
     }
 }
 
-/// Moves all particles from where they were, the same ones the same way on all ranks; none through a plane of symmetry
-/// and none deep into a wall.
+/// A plane of the scene that mirrors: its axis, place and side.
+type Mirror = (usize, f64, f64);
+
+fn mirrors(scene: &Scene) -> Vec<Mirror> {
+    let symmetric = [scene.symmetry[0] || scene.space == Kind::Axisymmetric, scene.symmetry[1]];
+    let planes = (0..2).filter(|&axis| symmetric[axis]).map(|axis| (axis, 0.0, 1.0));
+    let walls = scene.walls.iter().filter(|wall| wall.kind == WallKind::Mirror);
+    planes.chain(walls.map(|wall| (wall.axis, wall.at, wall.side))).collect()
+}
+
+/// Moves all particles from where they were, the same ones the same way on all ranks; none through a mirror and none
+/// deep into a wall.
 fn shift_all<const D: usize, const N: usize, P: Physics<D, N>>(
     simulation: &mut Simulation<D, N, P>,
+    scene: &Scene,
     x: &mut [Vector<D>],
     from: &[Vector<D>],
     shift: impl Fn(usize) -> [f64; 3],
@@ -198,11 +231,13 @@ fn shift_all<const D: usize, const N: usize, P: Physics<D, N>>(
     for (n, x) in x.iter_mut().enumerate() {
         let (old, by) = (P::Space::to_disk(from[n]), shift(n));
         let mut new = [0, 1, 2].map(|a| old[a] + by[a]);
-        for plane in 0..2 {
-            new[plane] = if simulation.mirrors.planes[plane] { new[plane].abs() } else { new[plane] };
+        for (axis, at, side) in mirrors(scene) {
+            if side * (new[axis] - at) < 0.0 {
+                new[axis] = 2.0 * at - new[axis];
+            }
         }
         new[2] = new[2].max(-0.2 * DX);
-        *x = P::Space::from_disk(new);
+        *x = simulation.periods.rounded(P::Space::from_disk(new));
     }
     let p = &mut simulation.particles;
     for i in 0..p.owned {
@@ -223,22 +258,41 @@ fn owners<const D: usize, const N: usize, P: Physics<D, N>>(
     owners
 }
 
-/// Keys of all material and of all its images, with their places.
+/// Keys of all material, of its copies one period away and of all images, with their places.
 fn everything<const D: usize, const N: usize, P: Physics<D, N>>(
-    planes: [bool; 2],
+    scene: &Scene,
     x: &[Vector<D>],
 ) -> Vec<(u64, Vector<D>)> {
+    let mirrors = mirrors(scene);
     let mut all = Vec::new();
     for (n, &place) in x.iter().enumerate() {
-        for image in 0..4u8 {
-            if (0..2).all(|plane| image & (1 << plane) == 0 || planes[plane]) {
-                let mut place = P::Space::to_disk(place);
-                for (plane, coordinate) in place.iter_mut().take(2).enumerate() {
-                    *coordinate *= if image & (1 << plane) == 0 { 1.0 } else { -1.0 };
+        let mut open = vec![(0u16, P::Space::to_disk(place))];
+        for axis in (0..3).filter(|&axis| P::Space::axis(axis).is_some()) {
+            let at = |side: f64| mirrors.iter().find(|m| m.0 == axis && m.2 == side).map(|m| m.1);
+            for (image, place) in open.clone() {
+                let mut more = |code: u16, coordinate: f64| {
+                    let mut other = place;
+                    other[axis] = coordinate;
+                    open.push((image | code << (3 * axis), other));
+                };
+                if let Some(period) = scene.periodic_axis(axis) {
+                    for shift in [-period.length, period.length] {
+                        more(0, place[axis] + shift);
+                    }
                 }
-                all.push((key(n as u64, image), P::Space::from_disk(place)));
+                let (low, high) = (at(1.0), at(-1.0));
+                for (code, plane) in [(1, low), (2, high)] {
+                    if let Some(plane) = plane {
+                        more(code, 2.0 * plane - place[axis]);
+                    }
+                }
+                if let (Some(low), Some(high)) = (low, high) {
+                    more(3, place[axis] + (2.0 * low - 2.0 * high));
+                    more(4, place[axis] + (2.0 * high - 2.0 * low));
+                }
             }
         }
+        all.extend(open.into_iter().map(|(image, place)| (key(n as u64, image), P::Space::from_disk(place))));
     }
     all
 }
@@ -262,7 +316,7 @@ fn all_sites<const D: usize, const N: usize, P: Physics<D, N>>(
         for j in along(1) {
             for k in along(2) {
                 let place = lattice.position([i, j, k]);
-                if lattice.distance(place) < 0.0 {
+                if lattice.distance_of_sites(place) < 0.0 {
                     sites.push((WallLattice::id([i, j, k]), P::Space::from_disk(place)));
                 }
             }
@@ -284,7 +338,7 @@ fn compare<const D: usize, const N: usize, P: Physics<D, N>>(
 ) {
     let p = &simulation.particles;
     let support = 2.0 * simulation.parameters.h;
-    let material = everything::<D, N, P>(simulation.mirrors.planes, x);
+    let material = everything::<D, N, P>(scene, x);
     let walls = all_sites::<D, N, P>(scene, &material);
 
     // Each particle has one owner; nothing of it was lost on the way.
@@ -299,17 +353,22 @@ fn compare<const D: usize, const N: usize, P: Physics<D, N>>(
     assert_eq!(wrong, None, "{name}: a particle and the number of its owners");
     assert_eq!(p.x.len(), p.len());
 
-    let keys: BTreeSet<u64> = p.key.iter().copied().collect();
-    assert_eq!(keys.len(), p.len(), "{name}: a key stands for two particles");
-
-    // Copies are where the particles are.
-    let mut places = material.clone();
-    places.extend(&walls);
-    places.sort_unstable_by_key(|(key, _)| *key);
-    for (key, place) in p.key.iter().zip(&p.x) {
-        let true_place = places[places.binary_search_by_key(key, |(key, _)| *key).expect(name)].1;
-        assert_eq!(*place, true_place, "{name}: place of {key:x}");
+    // Copies are where the particles are, each place is taken once.
+    let bits = |&(key, x): &(u64, Vector<D>)| (key, x.0.map(f64::to_bits));
+    let places: BTreeSet<_> = material.iter().chain(&walls).map(bits).collect();
+    let mut taken = BTreeSet::new();
+    for (&key, &place) in p.key.iter().zip(&p.x) {
+        let place = bits(&(key, place));
+        assert!(places.contains(&place), "{name}: place of {key:x}");
+        assert!(taken.insert(place), "{name}: {key:x} is there twice");
     }
+
+    // To search among: what is in reach of anything this rank sees.
+    let (low, high) = bounds(&p.x[..p.owned]);
+    let in_reach =
+        |(_, x): &&(u64, Vector<D>)| (0..D).all(|a| (low.0[a] - x.0[a]).max(x.0[a] - high.0[a]) < 2.5 * support);
+    let material: Vec<_> = material.iter().filter(in_reach).copied().collect();
+    let walls: Vec<_> = walls.iter().filter(in_reach).copied().collect();
 
     let found = |x: Vector<D>, list: &[u32]| -> BTreeSet<u64> {
         let keys: Vec<u64> = list.iter().map(|&j| p.key[j as usize]).collect();
@@ -339,6 +398,9 @@ fn compare<const D: usize, const N: usize, P: Physics<D, N>>(
     }
     let mut seen = [pairs_with_walls as u64, (p.halo - p.owned) as u64, (p.mirror - p.halo) as u64];
     simulation.comm.sum(&mut seen);
-    let alone = simulation.comm.size() == 1;
-    assert!(seen[0] > 0 && (alone || seen[1] > 0) && seen[2] > 0, "{name}: nothing was compared: {seen:?}");
+    let alone = simulation.comm.size() == 1 && scene.periodic == [None; 3];
+    let wanted = [WallLattice::new(scene).has_sites(), !alone, !mirrors(scene).is_empty()];
+    for (seen, wanted) in seen.into_iter().zip(wanted) {
+        assert_eq!(seen > 0, wanted, "{name}: {seen:?}");
+    }
 }

@@ -78,6 +78,69 @@ snapshots = "40 ms"
 history = "10 ms"
 "#;
 
+/// A column on a floor that slides, with wind from the left: it leaves at one end and comes in at the other.
+const PERIOD: &str = r#"
+space = "plane-strain"
+spacing = "10 mm"
+periodic = { x = { from = "-0.07 m", to = "0.23 m" } }
+[body.column]
+box = { min = [0, 0, 0], max = ["0.2 m", 0, "0.15 m"] }
+velocity = ["1.5 m/s", 0, 0]
+[initial]
+jitter = 0.05
+[end]
+time = "80 ms"
+[output]
+snapshots = "40 ms"
+history = "4 ms"
+"#;
+
+/// A column that is thrown into the corner of two mirror walls, one rough, one smooth.
+const CORNER: &str = r#"
+space = "plane-strain"
+spacing = "10 mm"
+symmetry = ["x"]
+[body.column]
+box = { min = [0, 0, 0], max = ["0.2 m", 0, "0.3 m"] }
+velocity = ["1 m/s", 0, 0]
+[wall.side]
+axis = "x"
+at = "0.25 m"
+side = "below"
+slip = "free-slip"
+kind = "mirror"
+[end]
+time = "80 ms"
+[output]
+snapshots = "40 ms"
+history = "4 ms"
+"#;
+
+/// A slab between a plane of symmetry and a mirror wall so near that images have images, periodic along y.
+const SLAB: &str = r#"
+space = "3d"
+spacing = "12.5 mm"
+symmetry = ["x"]
+periodic = { y = { from = "-0.025 m", to = "0.125 m" } }
+[body.column]
+box = { min = [0, 0, 0], max = ["0.05 m", "0.1 m", "0.2 m"] }
+velocity = [0, "1.2 m/s", 0]
+[wall.side]
+axis = "x"
+at = "0.05 m"
+side = "below"
+slip = "no-slip"
+kind = "mirror"
+velocity = [0, 0, "0.4 m/s"]
+[initial]
+jitter = 0.05
+[end]
+time = "80 ms"
+[output]
+snapshots = "40 ms"
+history = "10 ms"
+"#;
+
 fn scene(text: &str) -> String {
     format!("{text}{SHARED}")
 }
@@ -283,6 +346,31 @@ fn three_d() {
     trial.on_other_ranks(&text);
     trial.in_pieces();
     trial.after_a_kill();
+}
+
+#[test]
+fn periodic() {
+    let text = scene(PERIOD).replace("slip = \"no-slip\"", "slip = \"no-slip\"\nvelocity = [\"0.5 m/s\", 0, 0]");
+    let trial = Trial::new(&text);
+    trial.on_other_ranks(&text);
+    trial.in_pieces();
+    trial.after_a_kill();
+}
+
+#[test]
+fn between_mirror_walls() {
+    let text = scene(CORNER).replace("slip = \"no-slip\"", "slip = \"no-slip\"\nkind = \"mirror\"");
+    let trial = Trial::new(&text);
+    trial.on_other_ranks(&text);
+    trial.in_pieces();
+}
+
+#[test]
+fn slab_of_mirrors_and_periods() {
+    let text = scene(SLAB);
+    let trial = Trial::new(&text);
+    trial.on_other_ranks(&text);
+    trial.in_pieces();
 }
 
 /// By a signal to mpirun, by one to a single rank, by a file: exit code 75, and the same command goes on.

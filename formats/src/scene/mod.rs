@@ -13,11 +13,13 @@ mod law;
 mod material;
 mod numerics;
 mod period;
+mod periodic_axis;
 mod raw;
 mod walls;
 
 pub use error::{Fault, SceneError};
-pub use walls::{Site, WallLattice};
+pub use periodic_axis::PeriodicAxis;
+pub use walls::{Parity, Site, WallLattice};
 
 use crate::{kernel::Kernel, space::Space};
 
@@ -249,7 +251,7 @@ pub enum Shape {
     },
 }
 
-/// A plane wall normal to an axis, infinite in its plane; represented by virtual particles behind it.
+/// A plane wall normal to an axis, infinite in its plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wall {
     /// The axis it is normal to: 0 x, 1 y, 2 z.

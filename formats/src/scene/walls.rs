@@ -3,7 +3,7 @@
 //! Walls are infinite planes, so no file lists their particles: whoever needs some asks for the sites near a point.
 //! A site's place and number follow from its lattice coordinates alone, the same on every rank.
 
-use super::{Scene, Slip, Wall};
+use super::{PeriodicAxis, Scene, Slip, Wall, WallKind};
 use crate::space::Space;
 
 /// Lattice coordinates of a site; unused axes are zero.
@@ -12,10 +12,25 @@ pub type Site = [i32; 3];
 /// Sites behind the walls of a scene.
 #[derive(Clone, Debug)]
 pub struct WallLattice {
+    /// Those of kind `virtual` first.
     walls: Vec<Wall>,
+    /// How many of them are of that kind: only these have sites.
+    with_sites: usize,
     axes: &'static [usize],
     origin: [f64; 3],
     spacing: f64,
+    periods: [Option<PeriodicAxis>; 3],
+}
+
+/// What a wall does to the velocity and the stress extrapolated behind it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parity {
+    /// Factor of each component of the velocity.
+    pub velocity: [f64; 3],
+    /// What is added to it then, m/s.
+    pub motion: [f64; 3],
+    /// Is the axis reflected in the stress?
+    pub reflected: [bool; 3],
 }
 
 impl WallLattice {
@@ -26,20 +41,32 @@ impl WallLattice {
             // The axis of r-z is a plane of symmetry too: sites across it must be images of each other.
             let axis_of_rings = axis == 0 && scene.space == Space::Axisymmetric;
             let symmetric = axis_of_rings || (axis < 2 && scene.symmetry[axis]);
-            if let Some([from, _]) = scene.periodic[axis] {
-                origin[axis] = from;
+            if let Some(period) = scene.periodic_axis(axis) {
+                origin[axis] = period.from;
             } else if let (false, Some(wall)) = (symmetric, scene.walls.iter().find(|w| w.axis == axis)) {
                 origin[axis] = wall.at;
             }
         }
-        Self { walls: scene.walls.clone(), axes: scene.space.axes(), origin, spacing: scene.spacing }
+        let (mut walls, others): (Vec<_>, Vec<_>) = scene.walls.iter().partition(|wall| wall.kind == WallKind::Virtual);
+        let with_sites = walls.len();
+        walls.extend(others);
+        let periods = [0, 1, 2].map(|axis| scene.periodic_axis(axis));
+        Self { walls, with_sites, axes: scene.space.axes(), origin, spacing: scene.spacing, periods }
     }
 
-    /// Place of a site, m: the middle of its cell.
+    /// Place of a site, m: the middle of its cell. Sites a period apart are exactly a period apart.
     pub fn position(&self, site: Site) -> [f64; 3] {
         let mut x = [0.0; 3];
         for &a in self.axes {
-            x[a] = self.origin[a] + (f64::from(site[a]) + 0.5) * self.spacing;
+            let place = |i: i32| self.origin[a] + (f64::from(i) + 0.5) * self.spacing;
+            x[a] = match self.periods[a] {
+                None => place(site[a]),
+                Some(period) => {
+                    let cells = (period.length / self.spacing).round() as i32;
+                    let periods = f64::from(site[a].div_euclid(cells));
+                    period.round(place(site[a].rem_euclid(cells))) + periods * period.length
+                }
+            };
         }
         x
     }
@@ -52,38 +79,55 @@ impl WallLattice {
 
     /// Signed distance of a point to the nearest wall, m: positive on the material's side, infinite without walls.
     pub fn distance(&self, x: [f64; 3]) -> f64 {
-        self.walls.iter().map(|w| w.side * (x[w.axis] - w.at)).fold(f64::INFINITY, f64::min)
+        nearest(&self.walls, x)
     }
 
-    /// The walls a point lies behind.
+    /// The same to the nearest wall that has sites.
+    pub fn distance_of_sites(&self, x: [f64; 3]) -> f64 {
+        nearest(&self.walls[..self.with_sites], x)
+    }
+
+    /// Is there a wall that has sites?
+    pub fn has_sites(&self) -> bool {
+        self.with_sites > 0
+    }
+
+    /// The walls with sites that a point lies behind.
     pub fn behind(&self, x: [f64; 3]) -> impl Iterator<Item = &Wall> {
-        self.walls.iter().filter(move |w| w.side * (x[w.axis] - w.at) < 0.0)
+        self.walls[..self.with_sites].iter().filter(move |w| w.side * (x[w.axis] - w.at) < 0.0)
     }
 
-    /// What the wall does to a velocity and a stress extrapolated to `x` from the material. Behind free-slip walls
-    /// both are reflected; behind any no-slip wall the velocity is then reversed (Yang et al. 2020, Eqs 31, 32, with the
-    /// correction that only shear components with one normal index change sign).
-    /// Returns the factors for the velocity's components, and whether each axis is reflected in the stress.
-    pub fn parity(&self, x: [f64; 3]) -> ([f64; 3], [bool; 3]) {
-        let (mut velocity, mut reflected, mut stuck) = ([1.0; 3], [false; 3], false);
+    /// What the walls do to a velocity and a stress extrapolated to `x` from the material. Behind free-slip walls
+    /// both are reflected; behind any no-slip wall the velocity v then becomes 2 V - v (Yang et al. 2020, Eqs 31, 32, with
+    /// the corrections that only shear components with one normal index change sign, and that a wall may slide along
+    /// itself with a velocity V; in the corner of two no-slip walls V is the mean of theirs).
+    pub fn parity(&self, x: [f64; 3]) -> Parity {
+        let mut parity = Parity { velocity: [1.0; 3], motion: [0.0; 3], reflected: [false; 3] };
+        let mut stuck = 0.0;
         for wall in self.behind(x) {
             match wall.slip {
-                Slip::NoSlip => stuck = true,
+                Slip::NoSlip => {
+                    stuck += 1.0;
+                    for a in 0..3 {
+                        parity.motion[a] += 2.0 * wall.velocity[a];
+                    }
+                }
                 Slip::FreeSlip => {
-                    velocity[wall.axis] = -1.0;
-                    reflected[wall.axis] = true;
+                    parity.velocity[wall.axis] = -1.0;
+                    parity.reflected[wall.axis] = true;
                 }
             }
         }
-        if stuck {
-            velocity = velocity.map(|factor| -factor);
+        if stuck > 0.0 {
+            parity.velocity = parity.velocity.map(|factor| -factor);
+            parity.motion = parity.motion.map(|sum| sum / stuck);
         }
-        (velocity, reflected)
+        parity
     }
 
     /// Calls `visit` for every wall site within `reach` of `x`.
     pub fn near(&self, x: [f64; 3], reach: f64, mut visit: impl FnMut(Site)) {
-        if self.distance(x) >= reach {
+        if self.distance_of_sites(x) >= reach {
             return;
         }
         let (mut low, mut high) = ([0; 3], [0; 3]);
@@ -98,11 +142,16 @@ impl WallLattice {
                     let site = [i, j, k];
                     let p = self.position(site);
                     let r2: f64 = self.axes.iter().map(|&a| (p[a] - x[a]).powi(2)).sum();
-                    if r2 < reach * reach && self.distance(p) < 0.0 {
+                    if r2 < reach * reach && self.distance_of_sites(p) < 0.0 {
                         visit(site);
                     }
                 }
             }
         }
     }
+}
+
+/// Signed distance of a point to the nearest of some walls, m.
+fn nearest(walls: &[Wall], x: [f64; 3]) -> f64 {
+    walls.iter().map(|w| w.side * (x[w.axis] - w.at)).fold(f64::INFINITY, f64::min)
 }

@@ -5,6 +5,7 @@
 //! neighbour lists, so walls go where the flow goes. Every rank extrapolates for itself; its halo is wide enough along
 //! the walls for the same sums, term by term, on all of them.
 
+use crate::algebra::Vector;
 use crate::boundary::mirror::reflect_stress;
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
@@ -12,14 +13,7 @@ use crate::physics::Kernel;
 use crate::rates::wall::{extrapolate, weights};
 use crate::space::Space;
 use crate::sweep::Pairs;
-use formats::scene::{Site, WallLattice};
-
-/// What a wall does to the velocity and the stress extrapolated behind it.
-#[derive(Clone, Copy, Debug)]
-struct Parity {
-    velocity: [f64; 3],
-    reflected: [bool; 3],
-}
+use formats::scene::{Parity, Site, WallLattice};
 
 /// The virtual particles of one rank.
 #[derive(Clone, Debug)]
@@ -36,8 +30,18 @@ impl Walls {
         Self { lattice, volume, parities: Vec::new(), weights: Vec::new() }
     }
 
-    /// Signed distance of a point to the nearest wall, m.
-    pub fn distance<const D: usize, const N: usize, S: Space<D, N>>(&self, x: crate::algebra::Vector<D>) -> f64 {
+    /// Are there walls of virtual particles at all?
+    pub fn has_sites(&self) -> bool {
+        self.lattice.has_sites()
+    }
+
+    /// Signed distance of a point to the nearest wall of virtual particles, m.
+    pub fn distance_of_sites<const D: usize, const N: usize, S: Space<D, N>>(&self, x: Vector<D>) -> f64 {
+        self.lattice.distance_of_sites(S::to_disk(x))
+    }
+
+    /// Signed distance of a point to the nearest wall of any kind, m.
+    pub fn distance<const D: usize, const N: usize, S: Space<D, N>>(&self, x: Vector<D>) -> f64 {
         self.lattice.distance(S::to_disk(x))
     }
 
@@ -58,8 +62,7 @@ impl Walls {
         self.parities.clear();
         for (key, site) in sites {
             let place = self.lattice.position(site);
-            let (velocity, reflected) = self.lattice.parity(place);
-            self.parities.push(Parity { velocity, reflected });
+            self.parities.push(self.lattice.parity(place));
             p.key.push(key);
             p.x.push(S::from_disk(place));
             p.volume.push(self.volume);
@@ -78,7 +81,7 @@ impl Walls {
         for (wall, parity) in self.parities.iter().enumerate() {
             let mut v = S::to_disk(extrapolate(neighbors, &self.weights, wall, &p.v));
             for a in 0..3 {
-                v[a] *= parity.velocity[a];
+                v[a] = v[a] * parity.velocity[a] + parity.motion[a];
             }
             p.v[p.mirror + wall] = S::from_disk(v);
         }

@@ -1,8 +1,8 @@
-//! Copies of other ranks' particles within reach of this rank's: planned when neighbour lists are built, refreshed
-//! twice a step.
+//! Copies of other ranks' particles within reach of this rank's, and of its own across periodic borders: planned when
+//! neighbour lists are built, refreshed twice a step.
 
 use crate::algebra::Vector;
-use crate::boundary::field::Field;
+use crate::boundary::field::{Field, Spread, Words};
 use crate::neighbors::bounds;
 use crate::parallel::exchange::{exchange, payloads};
 use crate::particles::Particles;
@@ -11,17 +11,27 @@ use mpi::traits::{Communicator as _, *};
 
 /// Who gets copies of which owned particles, and where the copies of others go.
 #[derive(Debug, Default)]
-pub struct Halo {
+pub struct Halo<const D: usize> {
     peers: Vec<usize>,
-    /// Owned particles to send to each peer.
-    send: Vec<Vec<u32>>,
+    /// Copies to send to each peer.
+    send: Vec<Vec<Copied>>,
+    /// What copies differ by from their originals; the first is nothing.
+    shifts: Vec<Vector<D>>,
     /// Number of particles from each peer.
     receive: Vec<usize>,
     outgoing: Vec<u64>,
     incoming: Vec<u64>,
 }
 
-/// What is sent.
+/// A copy of an owned particle.
+#[derive(Clone, Copy, Debug)]
+struct Copied {
+    source: u32,
+    /// Which of the shifts it is moved by.
+    shift: u32,
+}
+
+/// What is filled around the owned particles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fields {
     /// Positions, velocities, volumes.
@@ -31,47 +41,75 @@ pub enum Fields {
 }
 
 impl Fields {
-    fn words(self, d: usize, n: usize) -> usize {
+    /// Calls `visit` with each field, always in the same order: what copies and images get of a particle.
+    pub fn visit<const D: usize, const N: usize>(
+        self,
+        p: &mut Particles<D, N>,
+        mut visit: impl FnMut(Field<'_, D, N>),
+    ) {
+        visit(Field::Scalar(&mut p.volume));
         match self {
-            Self::Motion => 2 * d + 1,
-            Self::Stress => n + 1,
+            Self::Motion => {
+                visit(Field::Place(&mut p.x));
+                visit(Field::Velocity(&mut p.v));
+            }
+            Self::Stress => visit(Field::Stress(&mut p.stress)),
         }
     }
 }
 
-impl Halo {
-    /// Finds the particles each rank needs of the others: those within `reach(x)` of the box around its own.
-    /// `widest` is the largest value `reach` takes. Appends the halo's keys to `particles`.
-    pub fn plan<const D: usize, const N: usize>(
+impl<const D: usize> Halo<D> {
+    /// Finds the particles each rank needs of the others, and of its own, shifted by one of `shifts`: those within
+    /// `reach(x)` of the box around its own. `shifts` starts with 0 and holds with every shift its opposite; `reach` is the
+    /// same for a particle and its shifted copies, `widest` its largest value. Appends the halo's keys to `particles`.
+    pub fn plan<const N: usize>(
         comm: &Communicator,
         particles: &mut Particles<D, N>,
+        shifts: Vec<Vector<D>>,
         reach: impl Fn(Vector<D>) -> f64,
         widest: f64,
     ) -> Self {
         debug_assert_eq!(particles.owned, particles.len());
         let boxes = gather_boxes(comm, &particles.x);
         let me = comm.rank() as usize;
-        let mut halo = Self::default();
+        let mut halo = Self { shifts, ..Self::default() };
         let Some(mine) = boxes[me] else {
             return halo.finish(particles, &[]);
         };
+        let by_reach: Vec<f64> = particles.x.iter().map(|&x| reach(x)).collect();
         for (rank, bounds) in boxes.iter().enumerate() {
-            let Some(theirs) = bounds.filter(|b| rank != me && gap2(&mine, b) < widest * widest) else { continue };
-            let near = |&i: &u32| {
-                let x = particles.x[i as usize];
-                let reach = reach(x);
-                gap2(&(x, x), &theirs) < reach * reach
-            };
+            let Some(theirs) = *bounds else { continue };
+            // Asked both ways round, so that two ranks agree on being peers to the last bit.
+            let (to, from) = (
+                |&s: &Vector<D>| gap2(&shifted(&mine, s), &theirs),
+                |&s: &Vector<D>| gap2(&shifted(&theirs, s), &mine),
+            );
+            let others = usize::from(rank == me);
+            if !halo.shifts[others..].iter().any(|s| to(s).min(from(s)) < widest * widest) {
+                continue;
+            }
+            let mut copies = Vec::new();
+            for (number, &shift) in halo.shifts.iter().enumerate().skip(others) {
+                let near = |&i: &u32| {
+                    let (x, reach) = (particles.x[i as usize] + shift, by_reach[i as usize]);
+                    gap2(&(x, x), &theirs) < reach * reach
+                };
+                let near = (0..particles.owned as u32).filter(near);
+                copies.extend(near.map(|source| Copied { source, shift: number as u32 }));
+            }
             halo.peers.push(rank);
-            halo.send.push((0..particles.owned as u32).filter(near).collect());
+            halo.send.push(copies);
         }
-        let keys: Vec<Vec<u64>> =
-            halo.send.iter().map(|list| list.iter().map(|&i| particles.key[i as usize]).collect()).collect();
+        let keys: Vec<Vec<u64>> = halo
+            .send
+            .iter()
+            .map(|list| list.iter().map(|copy| particles.key[copy.source as usize]).collect())
+            .collect();
         let incoming = exchange(comm, &halo.peers, &keys);
         halo.finish(particles, &incoming)
     }
 
-    fn finish<const D: usize, const N: usize>(mut self, particles: &mut Particles<D, N>, keys: &[Vec<u64>]) -> Self {
+    fn finish<const N: usize>(mut self, particles: &mut Particles<D, N>, keys: &[Vec<u64>]) -> Self {
         self.receive = keys.iter().map(Vec::len).collect();
         particles.key.extend(keys.iter().flatten());
         particles.halo = particles.key.len();
@@ -81,58 +119,61 @@ impl Halo {
     }
 
     /// Refreshes the copies.
-    pub fn fill<const D: usize, const N: usize>(
-        &mut self,
-        comm: &Communicator,
-        p: &mut Particles<D, N>,
-        fields: Fields,
-    ) {
-        let (owned, words) = (p.owned, fields.words(D, N));
-        self.pack(|i, message| {
-            message.push(p.volume[i].to_bits());
-            match fields {
-                Fields::Motion => message.extend(p.x[i].0.iter().chain(&p.v[i].0).map(|f| f.to_bits())),
-                Fields::Stress => message.extend(p.stress[i].0.iter().map(|f| f.to_bits())),
+    pub fn fill<const N: usize>(&mut self, comm: &Communicator, p: &mut Particles<D, N>, fields: Fields) {
+        // A message has all of one field, then all of the next.
+        let mut words = 0;
+        fields.visit(p, |field| words += count(&field));
+        self.outgoing.resize(self.send.iter().map(Vec::len).sum::<usize>() * words, 0);
+        self.incoming.resize(self.receive.iter().sum::<usize>() * words, 0);
+
+        let mut before = 0;
+        fields.visit(p, |field| {
+            let here = before;
+            before += count(&field);
+            match field {
+                Field::Scalar(field) => self.pack(words, here, field, |scalar, _| scalar),
+                Field::Place(field) => self.pack(words, here, field, |x, shift| x + shift),
+                Field::Velocity(field) | Field::Direction(field) => self.pack(words, here, field, |v, _| v),
+                Field::Stress(field) => self.pack(words, here, field, |stress, _| stress),
+                Field::Matrix(field) => self.pack(words, here, field, |matrix, _| matrix),
             }
         });
+
         self.send(comm, words);
-        for (i, copy) in (owned..).zip(self.incoming.chunks_exact(words)) {
-            let real = |k: usize| f64::from_bits(copy[k]);
-            p.volume[i] = real(0);
-            match fields {
-                Fields::Motion => {
-                    p.x[i] = Vector(std::array::from_fn(|a| real(1 + a)));
-                    p.v[i] = Vector(std::array::from_fn(|a| real(1 + D + a)));
+
+        let copies = p.owned..p.halo;
+        let mut before = 0;
+        fields.visit(p, |field| {
+            let here = before;
+            before += count(&field);
+            match field {
+                Field::Scalar(field) => self.unpack(words, here, &mut field[copies.clone()]),
+                Field::Place(field) | Field::Velocity(field) | Field::Direction(field) => {
+                    self.unpack(words, here, &mut field[copies.clone()]);
                 }
-                Fields::Stress => p.stress[i].0 = std::array::from_fn(|a| real(1 + a)),
+                Field::Stress(field) => self.unpack(words, here, &mut field[copies.clone()]),
+                Field::Matrix(field) => self.unpack(words, here, &mut field[copies.clone()]),
             }
-        }
+        });
     }
 
-    /// Gives a field of the owned particles to the copies on other ranks.
-    pub fn spread<const D: usize, const N: usize, T: Field<D, N>>(
+    /// Gives a field that only owned particles have to the copies of them.
+    pub fn spread<const N: usize, T: Spread<D, N>>(
         &mut self,
         comm: &Communicator,
-        owned: usize,
+        p: &Particles<D, N>,
         field: &mut Vec<T>,
     ) {
-        field.truncate(owned);
-        self.pack(|i, message| field[i].pack(message));
-        self.send(comm, T::WORDS);
-        field.extend(self.incoming.chunks_exact(T::WORDS).map(T::unpack));
+        self.outgoing.resize(self.send.iter().map(Vec::len).sum::<usize>() * T::COUNT, 0);
+        self.incoming.resize(self.receive.iter().sum::<usize>() * T::COUNT, 0);
+        self.pack(T::COUNT, 0, field, |value, _| value);
+        self.send(comm, T::COUNT);
+        field.resize(p.halo, T::zero());
+        self.unpack(T::COUNT, 0, &mut field[p.owned..]);
     }
 
-    /// Packs what the peers get of the owned particles.
-    fn pack(&mut self, pack: impl Fn(usize, &mut Vec<u64>)) {
-        self.outgoing.clear();
-        for &i in self.send.iter().flatten() {
-            pack(i as usize, &mut self.outgoing);
-        }
-    }
-
-    /// Exchanges what was packed, `words` a particle.
+    /// Sends what was packed and receives as much, `words` a particle.
     fn send(&mut self, comm: &Communicator, words: usize) {
-        self.incoming.resize(self.receive.iter().sum::<usize>() * words, 0);
         let mut outgoing: Vec<&[u64]> = Vec::with_capacity(self.peers.len());
         let mut rest: &[u64] = &self.outgoing;
         for list in &self.send {
@@ -149,6 +190,41 @@ impl Halo {
         }
         payloads(comm, &self.peers, &outgoing, incoming);
     }
+
+    /// Writes a field into all messages, behind `before` of the `words` that a particle has there.
+    fn pack<T: Words>(&mut self, words: usize, before: usize, field: &[T], copy: impl Fn(T, Vector<D>) -> T) {
+        let mut start = 0;
+        for list in &self.send {
+            let part = &mut self.outgoing[start + before * list.len()..][..T::COUNT * list.len()];
+            for (to, copied) in part.chunks_exact_mut(T::COUNT).zip(list) {
+                copy(field[copied.source as usize], self.shifts[copied.shift as usize]).put(to);
+            }
+            start += words * list.len();
+        }
+    }
+
+    /// The inverse.
+    fn unpack<T: Words>(&self, words: usize, before: usize, copies: &mut [T]) {
+        let (mut start, mut rest) = (0, copies);
+        for &count in &self.receive {
+            let (copies, others) = rest.split_at_mut(count);
+            let part = &self.incoming[start + before * count..][..T::COUNT * count];
+            for (copy, from) in copies.iter_mut().zip(part.chunks_exact(T::COUNT)) {
+                *copy = T::get(from);
+            }
+            (start, rest) = (start + words * count, others);
+        }
+    }
+}
+
+/// Words a particle has of a field.
+fn count<const D: usize, const N: usize>(field: &Field<'_, D, N>) -> usize {
+    match field {
+        Field::Scalar(_) => 1,
+        Field::Place(_) | Field::Velocity(_) | Field::Direction(_) => D,
+        Field::Stress(_) => N,
+        Field::Matrix(_) => D * D,
+    }
 }
 
 type Box<const D: usize> = (Vector<D>, Vector<D>);
@@ -162,6 +238,10 @@ fn gather_boxes<const D: usize>(comm: &Communicator, x: &[Vector<D>]) -> Vec<Opt
     comm.all_gather_into(&mine[..], &mut all[..]);
     let corner = |part: &[f64]| Vector(std::array::from_fn(|a| part[a]));
     all.chunks_exact(1 + 2 * D).map(|b| (b[0] > 0.0).then(|| (corner(&b[1..]), corner(&b[1 + D..])))).collect()
+}
+
+fn shifted<const D: usize>(a: &Box<D>, shift: Vector<D>) -> Box<D> {
+    (a.0 + shift, a.1 + shift)
 }
 
 /// Squared distance between two boxes.
