@@ -6,6 +6,8 @@
 use formats::h5::Communicator;
 use sph_run::algebra::{Sym, Vector};
 use sph_run::material::{History, Increment, Material};
+use sph_run::particles::{Particles, key};
+use sph_run::space::Space;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Numbers in [-1, 1), the same on every machine.
@@ -21,6 +23,31 @@ impl Random {
     pub fn sym<const N: usize>(&mut self, scale: f64) -> Sym<N> {
         Sym(std::array::from_fn(|_| scale * self.next()))
     }
+}
+
+/// A block of `side`^D particles with spacing 1, jittered, with random velocities and stresses.
+pub fn block<const D: usize, const N: usize, S: Space<D, N>>(side: usize, jitter: f64) -> Particles<D, N> {
+    let mut random = Random(7);
+    let mut p = Particles::<D, N>::default();
+    for k in 0..side.pow(D as u32) {
+        let place: Vector<D> = Vector(std::array::from_fn(|a| (k / side.pow(a as u32) % side) as f64 + 0.5));
+        p.key.push(key(k as u64, 0));
+        p.x.push(place + random.vector(jitter));
+        p.v.push(random.vector(1.0));
+        p.stress.push(random.sym(1.0));
+        p.density.push(1.0 + 0.1 * random.next());
+        p.mass.push(S::volume(1.0, 1.0, place, 1.0).recip() * p.density[k]);
+        p.a.push(Vector::default());
+        p.history.push(Default::default());
+        p.work.push(Default::default());
+        p.body.push(0);
+    }
+    let count = p.key.len();
+    p.own(count);
+    for i in 0..count {
+        p.volume[i] = S::volume(p.mass[i], p.density[i], p.x[i], 1.0);
+    }
+    p
 }
 
 /// sqrt(J2)
