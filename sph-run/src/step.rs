@@ -28,12 +28,13 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.drift(dt);
         if plan.lists_go_stale {
             self.rebuild();
-            if self.parameters.stabilisers.stress_diffusion > 0.0 {
-                self.fill(Fields::Stress);
-            }
         } else {
             self.refresh_volumes();
             self.fill(Fields::Motion);
+        }
+        if self.parameters.stabilisers.stress_diffusion > 0.0 {
+            // New copies have none yet; and what crossed a plane of symmetry turned its own around.
+            self.fill(Fields::Stress);
         }
         self.refresh_correction();
         self.diffuse();
