@@ -132,6 +132,12 @@ impl<const D: usize> Matrix<D> {
             std::array::from_fn(|b| (0..D).fold(0.0, |sum, c| sum + self.0[a][c] * other.0[c][b]))
         }))
     }
+    /// M + factor M M
+    #[inline(always)]
+    pub fn with_square(&self, factor: f64) -> Self {
+        let square = self.product(self);
+        Self(std::array::from_fn(|a| std::array::from_fn(|b| self.0[a][b] + factor * square.0[a][b])))
+    }
     /// Determinant; D is 2 or 3.
     pub fn determinant(&self) -> f64 {
         (0..D).fold(0.0, |sum, b| sum + self.0[0][b] * self.cofactor(0, b))

@@ -64,6 +64,7 @@ pub struct Buffers<const D: usize, const N: usize> {
     density_gradient: Vec<[f64; D]>,
     stress_gradient: Vec<[Sym<N>; D]>,
     opposing: Vec<Sym<N>>,
+    surface: Vec<f64>,
     shift: Vec<Vector<D>>,
 }
 
@@ -173,17 +174,21 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     }
 
     /// Shifts particles inside the body, where the scene asks for it. Last of a step: what follows sees them at their new
-    /// places, whether or not the run is stopped and resumed in between.
+    /// places, whether or not the run is stopped and resumed in between. Collective.
     pub fn shift(&mut self, dt: f64) {
         let strength = self.parameters.stabilisers.shifting;
-        if strength > 0.0 {
-            let mut shift = std::mem::take(&mut self.buffers.shift);
-            let pairs = self.parameters.pairs;
-            shifting::shift::<D, N, P::Kernel>(&self.particles, &self.neighbors, pairs, strength, dt, &mut shift);
-            for (x, shift) in self.particles.x.iter_mut().zip(&shift) {
-                *x += self.periods.rounded(*shift);
-            }
-            self.buffers.shift = shift;
+        if strength == 0.0 {
+            return;
         }
+        let (pairs, mut buffers) = (self.parameters.pairs, std::mem::take(&mut self.buffers));
+        let Buffers { surface, shift, .. } = &mut buffers;
+        shifting::surface::<D, N, P::Kernel>(&self.particles, &self.neighbors, pairs, surface);
+        self.spread(surface);
+        let how = shifting::Shifting { strength, dt, surface };
+        shifting::shift::<D, N, P::Kernel>(&self.particles, &self.neighbors, pairs, how, shift);
+        for (x, shift) in self.particles.x.iter_mut().zip(shift.iter()) {
+            *x += self.periods.rounded(*shift);
+        }
+        self.buffers = buffers;
     }
 }

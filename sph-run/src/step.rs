@@ -28,12 +28,13 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.drift(dt);
         if plan.lists_go_stale {
             self.rebuild();
-            if self.parameters.stabilisers.stress_diffusion > 0.0 {
-                self.fill(Fields::Stress);
-            }
         } else {
             self.refresh_volumes();
             self.fill(Fields::Motion);
+        }
+        if self.parameters.stabilisers.stress_diffusion > 0.0 {
+            // New copies have none yet; and what crossed a plane of symmetry turned its own around.
+            self.fill(Fields::Stress);
         }
         self.refresh_correction();
         self.diffuse();
@@ -80,7 +81,11 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         let p = &mut self.particles;
         let viscous = self.material.pair_viscosity().is_some();
         for (i, gradient) in self.gradient.iter().enumerate() {
-            let strain = P::Space::strain_rate(gradient, p.x[i], p.v[i], spacing) * dt;
+            // In the middle of the step, where the velocities are: dv/dx_mid = L (I - L dt/2)^-1, to second order. At its end a
+            // rotation by omega dt would seem to dilate by (omega dt)^2/2 along each axis, every step.
+            let gradient = &gradient.with_square(0.5 * dt);
+            let middle = p.x[i] - p.v[i] * (0.5 * dt);
+            let strain = P::Space::strain_rate(gradient, middle, p.v[i], spacing) * dt;
             // drho/dt = -rho tr D, to second order and never negative.
             let half = (0.5 * strain.trace()).clamp(-0.5, 0.5);
             p.density[i] *= (1.0 - half) / (1.0 + half);

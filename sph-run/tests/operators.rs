@@ -1,55 +1,18 @@
 //! The pair operators on lattices and jittered blocks, against closed forms: rows C1-C5 and C8-C11 of the list of
 //! verification problems.
 
+mod support;
+
 use formats::kernel::Kernel as Kind;
 use sph_run::algebra::{Matrix, Sym, Vector};
 use sph_run::neighbors::Neighbors;
-use sph_run::particles::{Particles, key};
+use sph_run::particles::Particles;
 use sph_run::physics::{CubicSpline, Kernel, WendlandC2};
 use sph_run::rates::momentum::{Viscosity, momentum};
 use sph_run::rates::velocity_gradient::velocity_gradient;
 use sph_run::space::{Axisymmetric, PlaneStrain, Space, ThreeD};
 use sph_run::sweep::Pairs;
-
-/// Numbers in [-1, 1), the same on every machine.
-struct Random(u64);
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-    fn vector<const D: usize>(&mut self, scale: f64) -> Vector<D> {
-        Vector(std::array::from_fn(|_| scale * self.next()))
-    }
-    fn sym<const N: usize>(&mut self) -> Sym<N> {
-        Sym(std::array::from_fn(|_| self.next()))
-    }
-}
-
-/// A block of `side`^D particles with spacing 1, jittered, with random velocities and stresses.
-fn block<const D: usize, const N: usize, S: Space<D, N>>(side: usize, jitter: f64) -> Particles<D, N> {
-    let mut random = Random(7);
-    let mut p = Particles::<D, N>::default();
-    for k in 0..side.pow(D as u32) {
-        let place: Vector<D> = Vector(std::array::from_fn(|a| (k / side.pow(a as u32) % side) as f64 + 0.5));
-        p.key.push(key(k as u64, 0));
-        p.x.push(place + random.vector(jitter));
-        p.v.push(random.vector(1.0));
-        p.stress.push(random.sym());
-        p.density.push(1.0 + 0.1 * random.next());
-        p.mass.push(S::volume(1.0, 1.0, place, 1.0).recip() * p.density[k]);
-        p.a.push(Vector::default());
-        p.history.push(Default::default());
-        p.work.push(Default::default());
-        p.body.push(0);
-    }
-    let count = p.key.len();
-    p.own(count);
-    for i in 0..count {
-        p.volume[i] = S::volume(p.mass[i], p.density[i], p.x[i], 1.0);
-    }
-    p
-}
+use support::block;
 
 struct Swept<const D: usize> {
     gradient: Vec<Matrix<D>>,

@@ -78,6 +78,115 @@ snapshots = "40 ms"
 history = "10 ms"
 "#;
 
+/// The mu(I) fluid with diffusion of its density and a viscosity on all pairs, thrown through its plane of symmetry.
+const GRAINS: &str = r#"
+space = "plane-strain"
+spacing = "10 mm"
+symmetry = ["x"]
+[material.mu-i]
+density = "1500 kg/m3"
+sound-speed = "12 m/s"
+friction-static = 0.38
+friction-dynamic = 0.64
+inertial-number = 0.279
+grain-diameter = "2 mm"
+[body.column]
+box = { min = [0, 0, 0], max = ["0.2 m", 0, "0.3 m"] }
+velocity = ["-0.5 m/s", 0, 0]
+[initial]
+jitter = 0.1
+[wall.floor]
+axis = "z"
+at = "0 m"
+side = "above"
+slip = "no-slip"
+[numerics]
+density-diffusion = 0.1
+viscosity-acts = "always"
+[end]
+time = "120 ms"
+[output]
+snapshots = "60 ms"
+history = "7 ms"
+"#;
+
+/// Every stabiliser at once on cohesive ground whose particles cross two planes of symmetry.
+const STABILISED: &str = r#"
+space = "3d"
+spacing = "12.5 mm"
+symmetry = ["x", "y"]
+[material.drucker-prager]
+density = "2600 kg/m3"
+young = "0.4 MPa"
+poisson = 0.3
+friction = "25 deg"
+cohesion = "0.5 kPa"
+mean-stress = "density"
+rotation = "hughes-winget"
+[body.column]
+cylinder = { radius = "0.1 m", height = "0.125 m" }
+velocity = ["-0.8 m/s", "-0.3 m/s", 0]
+[initial]
+jitter = 0.15
+[wall.floor]
+axis = "z"
+at = "0 m"
+side = "above"
+slip = "no-slip"
+[numerics]
+stress-diffusion = 0.1
+gradient-correction = "variational"
+artificial-stress = 0.3
+quadratic-viscosity = 1
+shifting = 0.5
+[end]
+time = "100 ms"
+[output]
+snapshots = "50 ms"
+history = "10 ms"
+"#;
+
+/// The visco-plastic fluid, its viscosity between pairs, against a smooth wall.
+const FLUID: &str = r#"
+space = "plane-strain"
+spacing = "10 mm"
+symmetry = ["x"]
+[kernel]
+kind = "wendland-c2"
+[material.visco-plastic]
+density = "1850 kg/m3"
+sound-speed = "12 m/s"
+friction = "20 deg"
+cohesion = "0.1 kPa"
+viscosity = "0.5 Pa s"
+viscosity-solid = "50 Pa s"
+operator = "harmonic"
+[body.column]
+box = { min = [0, 0, 0], max = ["0.2 m", 0, "0.25 m"] }
+velocity = ["-0.3 m/s", 0, 0]
+[initial]
+stress = "hydrostatic"
+jitter = 0.1
+[wall.floor]
+axis = "z"
+at = "0 m"
+side = "above"
+slip = "no-slip"
+[wall.side]
+axis = "x"
+at = "0.25 m"
+side = "below"
+slip = "free-slip"
+[numerics]
+density-diffusion = 0.05
+shifting = 0.2
+[end]
+time = "120 ms"
+[output]
+snapshots = "60 ms"
+history = "7 ms"
+"#;
+
 /// A column on a floor that slides, with wind from the left: it leaves at one end and comes in at the other.
 const PERIOD: &str = r#"
 space = "plane-strain"
@@ -346,6 +455,27 @@ fn three_d() {
     trial.on_other_ranks(&text);
     trial.in_pieces();
     trial.after_a_kill();
+}
+
+#[test]
+fn mu_i() {
+    let trial = Trial::new(GRAINS);
+    trial.on_other_ranks(GRAINS);
+    trial.in_pieces();
+}
+
+#[test]
+fn stabilised() {
+    let trial = Trial::new(STABILISED);
+    trial.on_other_ranks(STABILISED);
+    trial.in_pieces();
+}
+
+#[test]
+fn visco_plastic() {
+    let trial = Trial::new(FLUID);
+    trial.on_other_ranks(FLUID);
+    trial.in_pieces();
 }
 
 #[test]

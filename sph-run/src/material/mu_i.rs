@@ -44,7 +44,7 @@ pub struct Friction {
 }
 
 impl Friction {
-    /// alpha of Barker & Gray (2017), Eq 6.2: at most 2, for well-posedness at small I.
+    /// alpha of Barker & Gray (2017), Eq 6.3: below 2, or the equations are ill posed at small I.
     const ALPHA: f64 = 1.9;
     /// mu_inf of Barker & Gray (2017): slope of mu at large I, which widens the well-posed range there.
     const MU_INF: f64 = 0.05;
@@ -63,7 +63,7 @@ impl Friction {
     }
 
     /// mu(I): mu_s + (mu_2 - mu_s)/(1 + I0/I), or partially regularised: sqrt(alpha/ln(A/I)) below the lower neutral
-    /// inertial number, (mu_s I0 + mu_2 I + mu_inf I^2)/(I0 + I) above (Barker & Gray 2017).
+    /// inertial number, (mu_s I0 + mu_2 I + mu_inf I^2)/(I0 + I) above (Barker & Gray 2017, Eqs 6.3, 6.4).
     #[inline(always)]
     pub fn at(&self, inertial_number: f64) -> f64 {
         if self.neutral == 0.0 {

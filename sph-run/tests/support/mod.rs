@@ -1,0 +1,80 @@
+//! What tests of the solver share.
+
+// Each test program uses some of it.
+#![allow(dead_code)]
+
+use formats::h5::Communicator;
+use sph_run::algebra::{Sym, Vector};
+use sph_run::material::{History, Increment, Material};
+use sph_run::particles::{Particles, key};
+use sph_run::space::Space;
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+
+/// Numbers in [-1, 1), the same on every machine.
+pub struct Random(pub u64);
+impl Random {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+    pub fn vector<const D: usize>(&mut self, scale: f64) -> Vector<D> {
+        Vector(std::array::from_fn(|_| scale * self.next()))
+    }
+    pub fn sym<const N: usize>(&mut self, scale: f64) -> Sym<N> {
+        Sym(std::array::from_fn(|_| scale * self.next()))
+    }
+}
+
+/// A block of `side`^D particles with spacing 1, jittered, with random velocities and stresses.
+pub fn block<const D: usize, const N: usize, S: Space<D, N>>(side: usize, jitter: f64) -> Particles<D, N> {
+    let mut random = Random(7);
+    let mut p = Particles::<D, N>::default();
+    for k in 0..side.pow(D as u32) {
+        let place: Vector<D> = Vector(std::array::from_fn(|a| (k / side.pow(a as u32) % side) as f64 + 0.5));
+        p.key.push(key(k as u64, 0));
+        p.x.push(place + random.vector(jitter));
+        p.v.push(random.vector(1.0));
+        p.stress.push(random.sym(1.0));
+        p.density.push(1.0 + 0.1 * random.next());
+        p.mass.push(S::volume(1.0, 1.0, place, 1.0).recip() * p.density[k]);
+        p.a.push(Vector::default());
+        p.history.push(Default::default());
+        p.work.push(Default::default());
+        p.body.push(0);
+    }
+    let count = p.key.len();
+    p.own(count);
+    for i in 0..count {
+        p.volume[i] = S::volume(p.mass[i], p.density[i], p.x[i], 1.0);
+    }
+    p
+}
+
+/// sqrt(J2)
+pub fn root_j2<const N: usize>(s: Sym<N>) -> f64 {
+    (0.5 * s.deviator().contract(s.deviator())).sqrt()
+}
+
+/// The stress of a law that forgets the old one, at a rate of deformation and a density.
+pub fn stress<const N: usize>(law: &impl Material, rate: Sym<N>, density: f64, dt: f64) -> Sym<N> {
+    law.stress(Sym::default(), &Increment { strain: rate * dt, density, dt }, &mut History::default())
+}
+
+#[track_caller]
+pub fn close(got: f64, want: f64, tolerance: f64) {
+    let error = (got - want).abs() / if want == 0.0 { 1.0 } else { want.abs() };
+    assert!(error <= tolerance, "got {got:e}, want {want:e}: error {error:e} above {tolerance:e}");
+}
+
+/// MPI with one rank for every test of a program, one test at a time.
+pub fn alone() -> (MutexGuard<'static, ()>, Communicator) {
+    static STARTED: OnceLock<()> = OnceLock::new();
+    static TURN: Mutex<()> = Mutex::new(());
+    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    STARTED.get_or_init(|| {
+        let (universe, _) = mpi::initialize_with_threading(mpi::Threading::Serialized).expect("MPI starts");
+        // It ends with the process.
+        std::mem::forget(universe);
+    });
+    (turn, Communicator::world())
+}
