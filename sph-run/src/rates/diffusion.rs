@@ -47,7 +47,8 @@ pub fn gradient<const D: usize, const N: usize, K: Kernel, T: Diffusing>(
 ///
 /// over the material: delta-SPH for the density (Antuono et al. 2010; Yang et al. 2020, Eqs 23, 24), and the same operator for
 /// each component of the stress (Feng et al. 2021). The gradients take out what is linear, so that it does not bend the
-/// profile at a free surface. What one particle gains the other loses: sum V df/dt = 0.
+/// profile at a free surface. What one particle gains the other loses: sum V df/dt = 0, with the sections of rings in the
+/// axisymmetric space.
 pub fn diffusion<const D: usize, const N: usize, K: Kernel, T: Diffusing>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
