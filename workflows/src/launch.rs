@@ -74,13 +74,25 @@ pub enum Stop {
 /// Starts a program and waits for it. What it writes to standard output goes to standard error: there only the
 /// workflow's own result paths belong. This process outlives requests to stop, so that it can say how to go on.
 pub fn wait(command: Cmd<'_>, stop: Stop) -> Result<End, Failure> {
+    wait_with(command, stop, None)
+}
+
+/// The same; with a log, both outputs go to the end of that file.
+pub fn wait_with(command: Cmd<'_>, stop: Stop, log: Option<&Path>) -> Result<End, Failure> {
     let name = command.to_string();
     let cannot = |what: &str, e: std::io::Error| Failure::no_input(format!("cannot {what} `{name}`: {e}"));
     let requested = Arc::new(AtomicBool::new(false));
     let watch = |signal| signal_hook::flag::register(signal, Arc::clone(&requested)).map_err(|e| cannot("start", e));
     let watches = [watch(SIGINT)?, watch(SIGTERM)?];
     let mut command = Command::from(command);
-    command.stdout(Stdio::from(std::io::stderr()));
+    match log {
+        None => command.stdout(Stdio::from(std::io::stderr())),
+        Some(log) => {
+            let fault = |e: std::io::Error| Failure::cannot_write(format!("{}: {e}", log.display()));
+            let file = std::fs::File::options().create(true).append(true).open(log).map_err(fault)?;
+            command.stdout(file.try_clone().map_err(fault)?).stderr(file)
+        }
+    };
     if stop == Stop::Gently {
         command.process_group(0).stdin(Stdio::null());
     }

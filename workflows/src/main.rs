@@ -6,6 +6,7 @@ mod gate;
 mod launch;
 mod paths;
 mod stage;
+mod study;
 mod validate;
 
 use clap::{Parser, Subcommand};
@@ -50,6 +51,13 @@ enum Command {
         #[arg(long)]
         reuse: bool,
     },
+    /// Run what a study still lacks, cheapest runs first, then refresh its tables and pictures; list the studies.
+    Study {
+        /// Folder under tests/validation; the studies are listed where none is named.
+        name: Option<String>,
+        #[command(flatten)]
+        options: study::Options,
+    },
     /// Run every test of the repository; ends with exit code 1 where one fails.
     Test {
         /// Handed on to the test runner.
@@ -93,6 +101,8 @@ fn carry_out(command: Command) -> Result<(), Failure> {
         }
         Command::Cases => cases::list(),
         Command::Validate { names, ranks, reuse } => validate::all(&names, ranks, reuse),
+        Command::Study { name: None, .. } => study::list(),
+        Command::Study { name: Some(name), options } => study::carry_out(&name, &options),
         Command::Test { arguments } => gate::test(&arguments),
         Command::Help => {
             use clap::CommandFactory;
@@ -117,7 +127,14 @@ fn run(
         again += &format!(" --ranks {ranks}");
     }
     let programs = stage::Programs::build()?;
-    let job = stage::Job { scene: &case.scene, folder: &folder, ranks: how.ranks, fresh: how.fresh, again: &again };
+    let job = stage::Job {
+        scene: &case.scene,
+        folder: &folder,
+        ranks: how.ranks,
+        fresh: how.fresh,
+        again: &again,
+        log: None,
+    };
     stage::run(&programs, &job)?;
     eprintln!("talus: finished: {}", case.title);
     for path in stage::results(&folder) {

@@ -23,6 +23,21 @@ pub fn validation() -> PathBuf {
     repository().join("tests").join("validation")
 }
 
+/// Run folders of a study.
+pub fn study_runs(study: &str) -> PathBuf {
+    runs().join("studies").join(study)
+}
+
+/// Pictures of the studies.
+pub fn pictures() -> PathBuf {
+    repository().join("docs").join("validation")
+}
+
+/// The page that studies are shown on.
+pub fn page() -> PathBuf {
+    repository().join("VALIDATION.md")
+}
+
 /// A path of the command line: relative to where the user called, which the launcher leaves for the repository's root.
 pub fn from_caller(path: &Path) -> PathBuf {
     called_from().join(path)

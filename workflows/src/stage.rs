@@ -27,6 +27,8 @@ pub struct Job<'a> {
     pub fresh: bool,
     /// The command that goes on after a failure.
     pub again: &'a str,
+    /// Where the stages write what they say; standard error where it is none.
+    pub log: Option<&'a Path>,
 }
 
 impl Programs {
@@ -57,6 +59,11 @@ impl Programs {
                 message: "the programs could not be built, see above; go on with: ./talus and the same words".into(),
             }),
         }
+    }
+
+    /// The same programs for another thread.
+    pub fn again(&self) -> Result<Self, Failure> {
+        Ok(Self { shell: launch::shell()?, folder: self.folder.clone() })
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -93,21 +100,22 @@ pub fn compute(programs: &Programs, job: &Job) -> Result<(), Failure> {
     let folder = RunFolder::new(job.folder);
     let name = paths::short(job.folder).display().to_string();
     if folder.done().is_file() {
-        eprintln!("talus: {name} is done: only the results are made again (--fresh starts over)");
+        say(job, &format!("{name} is done: only the results are made again (--fresh starts over)"));
     } else {
         let header = snapshot::read_header(&folder.initial()).map_err(|e| Failure {
             code: e.exit_code(),
             message: format!("{e}; start over with: {} --fresh", job.again),
         })?;
         let ranks = launch::ranks(job.ranks, header.count);
-        eprintln!("talus: sph-run on {ranks} rank{}, {} particles", if ranks == 1 { "" } else { "s" }, header.count);
+        let plural = if ranks == 1 { "" } else { "s" };
+        say(job, &format!("sph-run on {ranks} rank{plural}, {} particles", header.count));
         let command = launch::parallel(&programs.shell, &programs.path("sph-run"), ranks).arg(job.folder);
-        passed("sph-run", launch::wait(command, Stop::Gently)?, job)?;
+        passed("sph-run", launch::wait_with(command, Stop::Gently, job.log)?, job)?;
     }
-    eprintln!("talus: sph-post");
+    say(job, "sph-post");
     let post = programs.path("sph-post");
     let command = cmd!(programs.shell, "{post}").arg(job.folder);
-    passed("sph-post", launch::wait(command, Stop::AtOnce)?, job)
+    passed("sph-post", launch::wait_with(command, Stop::AtOnce, job.log)?, job)
 }
 
 /// What a run leaves for people: the snapshots' index, the history, and everything in `post/`.
@@ -119,16 +127,23 @@ pub fn results(folder: &Path) -> Vec<PathBuf> {
     [folder.series(), folder.history()].into_iter().filter(|path| path.is_file()).chain(made).collect()
 }
 
+/// News of a job; in the log, the stages speak for themselves.
+fn say(job: &Job, news: &str) {
+    if job.log.is_none() {
+        eprintln!("talus: {news}");
+    }
+}
+
 fn sph_prep(programs: &Programs, job: &Job) -> Result<(), Failure> {
     if let Some(parent) = job.folder.parent() {
         std::fs::create_dir_all(parent)
             .map_err(|e| Failure::cannot_write(format!("{}: cannot make the folder: {e}", parent.display())))?;
     }
-    eprintln!("talus: sph-prep {}", paths::short(job.scene).display());
+    say(job, &format!("sph-prep {}", paths::short(job.scene).display()));
     let ranks = job.ranks.unwrap_or_else(launch::cores);
     let command = launch::parallel(&programs.shell, &programs.path("sph-prep"), ranks);
     let command = command.arg(job.scene).arg("-o").arg(job.folder);
-    passed("sph-prep", launch::wait(command, Stop::AtOnce)?, job)
+    passed("sph-prep", launch::wait_with(command, Stop::AtOnce, job.log)?, job)
 }
 
 fn is_occupied(folder: &Path) -> bool {
@@ -197,7 +212,7 @@ mod tests {
     use super::*;
 
     fn job<'a>(scene: &'a Path, folder: &'a Path) -> Job<'a> {
-        Job { scene, folder, ranks: None, fresh: false, again: "./talus case x" }
+        Job { scene, folder, ranks: None, fresh: false, again: "./talus case x", log: None }
     }
 
     #[test]

@@ -89,7 +89,7 @@ fn number(post: &Path, key: &str) -> Result<f64, Failure> {
 }
 
 /// `post/summary.json`: null where the scene has no meaning for a number.
-fn summary(post: &Path) -> Result<Value, Failure> {
+pub fn summary(post: &Path) -> Result<Value, Failure> {
     let path = post.join("summary.json");
     let fault = |e: String| Failure::no_input(format!("{}: {e}", crate::paths::short(&path).display()));
     let text = std::fs::read_to_string(&path).map_err(|e| fault(e.to_string()))?;

@@ -2,8 +2,8 @@
 
 mod checks;
 mod laws;
-mod measure;
-mod record;
+pub mod measure;
+pub mod record;
 mod report;
 
 use crate::{cases, failure::Failure, launch, paths, stage};
@@ -59,8 +59,14 @@ fn run(
         .map_err(|e| Failure::no_input(format!("{}: cannot read the scene: {e}", found.scene.display())))?;
     let scene = Scene::read(case, &text).map_err(|e| Failure::usage(e.to_string()))?;
     let folder = paths::runs().join("validation").join(&found.name);
-    let job =
-        stage::Job { scene: &found.scene, folder: &folder, ranks, fresh: false, again: "./talus validate --reuse" };
+    let job = stage::Job {
+        scene: &found.scene,
+        folder: &folder,
+        ranks,
+        fresh: false,
+        again: "./talus validate --reuse",
+        log: None,
+    };
     let earlier = match reuse {
         true => record::earlier(&folder, &text, sources),
         false => Earlier::Useless("not asked for"),

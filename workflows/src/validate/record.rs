@@ -55,6 +55,19 @@ impl Sources {
     }
 }
 
+impl Sources {
+    /// The last commit that changed what computes a run, so that commits of scenes, results and pages do not make old runs
+    /// look out of date.
+    pub fn of_programs() -> Result<Self, Failure> {
+        let shell = launch::shell()?;
+        let read = |command: xshell::Cmd<'_>| command.quiet().ignore_stderr().read().unwrap_or_default();
+        let parts = ["Cargo.toml", "Cargo.lock", "formats/src", "sph-prep/src", "sph-run/src"];
+        let commit = read(cmd!(shell, "git log -1 --format=%h --abbrev=12 -- {parts...}"));
+        let changed = !read(cmd!(shell, "git status --porcelain -- {parts...}")).is_empty();
+        Ok(Self { commit: if commit.is_empty() { "unknown".into() } else { commit }, changed })
+    }
+}
+
 impl std::fmt::Display for Sources {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}{}", self.commit, if self.changed { " with uncommitted changes" } else { "" })
