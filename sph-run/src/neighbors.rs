@@ -5,6 +5,8 @@
 
 use crate::algebra::Vector;
 use crate::particles::Particles;
+use crate::physics::Kernel;
+use crate::sweep::Support;
 
 /// Lists of indices, one after the other.
 #[derive(Clone, Debug, Default)]
@@ -48,9 +50,16 @@ pub struct Neighbors {
     pub of_owned: Lists,
     /// For each wall particle: material particles of all ranges but the walls.
     pub of_wall: Lists,
+    /// Of the lists of owned particles, what is within the support at this step.
+    pub support: Support,
 }
 
 impl Neighbors {
+    /// Finds what is within the support, 2h, at the present places.
+    pub fn find<const D: usize, const N: usize, K: Kernel>(&mut self, particles: &Particles<D, N>, h: f64) {
+        self.support.find::<D, N, K>(particles, &self.of_owned, h);
+    }
+
     /// Lists of all pairs closer than `reach`.
     pub fn build<const D: usize, const N: usize>(&mut self, particles: &Particles<D, N>, reach: f64) {
         // Number the particles in ascending key. Cells hold these numbers, so that a list is sorted as plain integers.

@@ -17,6 +17,7 @@ use crate::timestep::Plan;
 impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Accelerations at the very start. Collective.
     pub fn begin(&mut self) {
+        self.find_support();
         self.refresh_correction();
         self.accelerate();
     }
@@ -36,6 +37,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             // New copies have none yet; and what crossed a plane of symmetry turned its own around.
             self.fill(Fields::Stress);
         }
+        self.find_support();
         self.refresh_correction();
         self.diffuse();
         self.update_stress(dt);
@@ -48,6 +50,10 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.clock.time = plan.time;
         self.clock.time_step = dt;
         self.clock.step += 1;
+    }
+
+    fn find_support(&mut self) {
+        self.neighbors.find::<D, N, P::Kernel>(&self.particles, self.parameters.h);
     }
 
     /// v += a dt, damped implicitly.
@@ -71,12 +77,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Density and stress of the owned particles, from the velocity gradient.
     fn update_stress(&mut self, dt: f64) {
         let (spacing, gate) = (self.parameters.spacing, self.parameters.gate);
-        velocity_gradient::<D, N, P::Kernel>(
-            &self.particles,
-            &self.neighbors,
-            self.parameters.pairs,
-            &mut self.gradient,
-        );
+        velocity_gradient(&self.particles, &self.neighbors, &mut self.gradient);
         self.correct_gradient();
         let p = &mut self.particles;
         let viscous = self.material.pair_viscosity().is_some();
@@ -139,7 +140,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         let (p, heat, parameters) = (&self.particles, &mut self.buffers.heat, &self.parameters);
         heat.resize(p.owned, 0.0);
         let (pairs, viscosity) = (parameters.pairs, parameters.viscosity);
-        momentum::<D, N, P::Space, P::Kernel, T>(p, &self.neighbors, pairs, viscosity, weighted, a, heat);
+        momentum::<D, N, P::Space, T>(p, &self.neighbors, pairs, viscosity, weighted, a, heat);
     }
 
     /// Counts the heat of the viscosity.

@@ -1,7 +1,9 @@
-//! The only loop over pairs of particles. It gathers into one particle, over its neighbours in ascending key: the sums,
-//! and so the bits of the answer, do not depend on ranks, on lists, or on restarts. What is summed is in [`crate::rates`].
+//! The only loops over pairs of particles: one finds those within the support, the other goes through them. Sums gather
+//! into one particle, over its neighbours in ascending key: they, and so the bits of the answer, do not depend on ranks,
+//! on lists, or on restarts. What is summed is in [`crate::rates`].
 
 use crate::algebra::Vector;
+use crate::neighbors::Lists;
 use crate::particles::Particles;
 use crate::physics::Kernel;
 
@@ -37,6 +39,46 @@ impl Scales {
     }
 }
 
+/// The pairs within the support of the kernel, found once a step: every sum of the step runs over them.
+#[derive(Clone, Debug, Default)]
+pub struct Support {
+    starts: Vec<u32>,
+    found: Vec<Found>,
+}
+
+/// A neighbour within the support, and W'/r there.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    j: u32,
+    slope: f64,
+}
+
+impl Support {
+    /// Finds the particles of the lists that are within the support now, in the order of the lists.
+    pub fn find<const D: usize, const N: usize, K: Kernel>(
+        &mut self,
+        particles: &Particles<D, N>,
+        lists: &Lists,
+        h: f64,
+    ) {
+        let scales = Scales::new::<D, K>(h);
+        self.starts.clear();
+        self.found.clear();
+        self.starts.push(0);
+        for i in 0..particles.owned {
+            let x = particles.x[i];
+            for &j in lists.of(i) {
+                let r2 = (x - particles.x[j as usize]).norm2();
+                if r2 < scales.support2 {
+                    let slope = scales.slope * K::KIND.slope_over_q(r2.sqrt() * scales.per_h);
+                    self.found.push(Found { j, slope });
+                }
+            }
+            self.starts.push(self.found.len() as u32);
+        }
+    }
+}
+
 /// A neighbour within the support of the kernel.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<const D: usize> {
@@ -44,30 +86,30 @@ pub struct Pair<const D: usize> {
     pub j: usize,
     /// x_i - x_j.
     pub d: Vector<D>,
-    /// |d|^2.
-    pub r2: f64,
     /// grad_i W = slope d.
     pub slope: f64,
 }
 
-/// Calls `visit` with every particle of `list` within the support around particle `i`, in the order of the list.
+impl<const D: usize> Pair<D> {
+    /// |d|^2.
+    #[inline(always)]
+    pub fn r2(&self) -> f64 {
+        self.d.norm2()
+    }
+}
+
+/// Calls `visit` with every particle within the support around the owned particle `i`, in ascending key.
 #[inline(always)]
-pub fn around<const D: usize, const N: usize, K: Kernel>(
+pub fn around<const D: usize, const N: usize>(
     particles: &Particles<D, N>,
-    list: &[u32],
-    scales: Scales,
+    support: &Support,
     i: usize,
     mut visit: impl FnMut(Pair<D>),
 ) {
     let x = particles.x[i];
-    for &j in list {
+    for &Found { j, slope } in &support.found[support.starts[i] as usize..support.starts[i + 1] as usize] {
         let j = j as usize;
-        let d = x - particles.x[j];
-        let r2 = d.norm2();
-        if r2 < scales.support2 {
-            let slope = scales.slope * K::KIND.slope_over_q(r2.sqrt() * scales.per_h);
-            visit(Pair { j, d, r2, slope });
-        }
+        visit(Pair { j, d: x - particles.x[j], slope });
     }
 }
 

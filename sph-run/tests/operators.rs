@@ -26,14 +26,15 @@ fn sweep_all<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
 ) -> Swept<D> {
     let mut neighbors = Neighbors::default();
     neighbors.build(p, 2.1 * h);
+    neighbors.find::<D, N, K>(p, h);
     let pairs = Pairs { h, spacing: 1.0 };
     let viscosity = Viscosity { strength: viscosity, below: 0.0 };
     let mut gradient = vec![Matrix::default(); p.owned];
-    velocity_gradient::<D, N, K>(p, &neighbors, pairs, &mut gradient);
+    velocity_gradient(p, &neighbors, &mut gradient);
     let weighted: Vec<_> = p.stress.iter().zip(&p.x).map(|(&s, &x)| s * S::metric(x, 1.0)).collect();
     let mut acceleration = vec![Vector::default(); p.owned];
     let mut heat = vec![0.0; p.owned];
-    momentum::<D, N, S, K, _>(p, &neighbors, pairs, viscosity, &weighted, &mut acceleration, &mut heat);
+    momentum::<D, N, S, _>(p, &neighbors, pairs, viscosity, &weighted, &mut acceleration, &mut heat);
     Swept { gradient, acceleration }
 }
 

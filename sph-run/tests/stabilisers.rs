@@ -21,21 +21,22 @@ const H: f64 = 1.2;
 const PAIRS: Pairs = Pairs { h: H, spacing: 1.0 };
 const NONE: Viscosity = Viscosity { strength: 0.0, below: 0.0 };
 
-fn neighbors<const D: usize, const N: usize>(p: &Particles<D, N>) -> Neighbors {
+fn neighbors<const D: usize, const N: usize, K: Kernel>(p: &Particles<D, N>) -> Neighbors {
     let mut neighbors = Neighbors::default();
     neighbors.build(p, 2.1 * H);
+    neighbors.find::<D, N, K>(p, H);
     neighbors
 }
 
 fn corrections<const D: usize, const N: usize, K: Kernel>(p: &Particles<D, N>) -> Vec<Matrix<D>> {
     let mut tensors = Vec::new();
-    correction::<D, N, K>(p, &neighbors(p), PAIRS, Among::All, &mut tensors);
+    correction(p, &neighbors::<_, _, K>(p), Among::All, &mut tensors);
     tensors
 }
 
 fn gradients<const D: usize, const N: usize, K: Kernel>(p: &Particles<D, N>) -> Vec<Matrix<D>> {
     let mut gradient = vec![Matrix::default(); p.owned];
-    velocity_gradient::<D, N, K>(p, &neighbors(p), PAIRS, &mut gradient);
+    velocity_gradient(p, &neighbors::<_, _, K>(p), &mut gradient);
     gradient.iter().zip(corrections::<D, N, K>(p)).map(|(g, l)| g.product(&l)).collect()
 }
 
@@ -47,7 +48,7 @@ fn corrected_momentum<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>
     let weighted = |i: usize| S::matrix(&(p.stress[i] * S::metric(p.x[i], 1.0))).product(&l[i]);
     let weighted: Vec<_> = (0..p.owned).map(weighted).collect();
     let (mut a, mut heat) = (vec![Vector::default(); p.owned], vec![0.0; p.owned]);
-    momentum::<D, N, S, K, _>(p, &neighbors(p), PAIRS, NONE, &weighted, &mut a, &mut heat);
+    momentum::<D, N, S, _>(p, &neighbors::<_, _, K>(p), PAIRS, NONE, &weighted, &mut a, &mut heat);
     a
 }
 
@@ -158,18 +159,18 @@ fn viscous<const D: usize, const N: usize, S: Space<D, N>>(
     p: &Particles<D, N>,
     kind: Kind,
 ) -> (Vec<Vector<D>>, Vec<f64>) {
-    let (neighbors, nothing) = (neighbors(p), vec![Sym::<N>::default(); p.len()]);
+    let (neighbors, nothing) = (neighbors::<_, _, CubicSpline>(p), vec![Sym::<N>::default(); p.len()]);
     let (mut a, mut heat) = (vec![Vector::default(); p.owned], vec![0.0; p.owned]);
     let linear = match kind {
         Kind::Approaching => Viscosity { strength: 1.0, below: 0.0 },
         Kind::Always => Viscosity { strength: 1.0, below: f64::INFINITY },
         Kind::Impact | Kind::Fluid(_) => NONE,
     };
-    momentum::<D, N, S, CubicSpline, _>(p, &neighbors, PAIRS, linear, &nothing, &mut a, &mut heat);
+    momentum::<D, N, S, _>(p, &neighbors, PAIRS, linear, &nothing, &mut a, &mut heat);
     match kind {
-        Kind::Impact => viscosity::on_impact::<D, N, S, CubicSpline>(p, &neighbors, PAIRS, 1.0, &mut a, &mut heat),
+        Kind::Impact => viscosity::on_impact::<D, N, S>(p, &neighbors, PAIRS, 1.0, &mut a, &mut heat),
         Kind::Fluid(mean) => {
-            viscosity::between_particles::<D, N, S, CubicSpline>(p, &neighbors, PAIRS, mean, &mut a, &mut heat);
+            viscosity::between_particles::<D, N, S>(p, &neighbors, PAIRS, mean, &mut a, &mut heat);
         }
         Kind::Approaching | Kind::Always => {}
     }
@@ -312,10 +313,11 @@ fn viscosities_of_two_layers() {
 fn c12_diffusion() {
     /// Rates of a field by diffusion with strength 1.
     fn rates<const D: usize, const N: usize, T: diffusion::Diffusing>(p: &Particles<D, N>, field: &[T]) -> Vec<T> {
-        let (neighbors, mut l, mut slopes, mut rate) = (neighbors(p), Vec::new(), Vec::new(), Vec::new());
-        correction::<D, N, CubicSpline>(p, &neighbors, PAIRS, Among::Material, &mut l);
-        diffusion::gradient::<D, N, CubicSpline, T>(p, &neighbors, PAIRS, &l, field, &mut slopes);
-        diffusion::diffusion::<D, N, CubicSpline, T>(p, &neighbors, PAIRS, 1.0, field, &slopes, &mut rate);
+        let (neighbors, mut l, mut slopes, mut rate) =
+            (neighbors::<_, _, CubicSpline>(p), Vec::new(), Vec::new(), Vec::new());
+        correction(p, &neighbors, Among::Material, &mut l);
+        diffusion::gradient(p, &neighbors, &l, field, &mut slopes);
+        diffusion::diffusion(p, &neighbors, 1.0, field, &slopes, &mut rate);
         rate
     }
     fn check<const D: usize, const N: usize, S: Space<D, N>>() {
@@ -362,7 +364,7 @@ fn the_rate_of_diffusion() {
     let mut rate = Vec::new();
     let slopes = [[0.4, 9.0, 9.0], [0.1, -9.0, 9.0]];
     let field = [1.0, 3.0];
-    diffusion::diffusion::<3, 6, CubicSpline, f64>(&p, &neighbors(&p), PAIRS, 5.0, &field, &slopes, &mut rate);
+    diffusion::diffusion(&p, &neighbors::<_, _, CubicSpline>(&p), 5.0, &field, &slopes, &mut rate);
     // x_ji = (1, 0, 0), and grad_i W points to j times -slope.
     close(rate[0], 5.0 * p.volume[1] * (2.0 * 2.0 - 0.5) * -slope, 1e-13);
     close(rate[1], -5.0 * p.volume[0] * (2.0 * 2.0 - 0.5) * -slope, 1e-13);
@@ -376,7 +378,13 @@ fn artificial_stress() {
     fn push<const D: usize, const N: usize, S: Space<D, N>>(p: &Particles<D, N>) -> Vec<Vector<D>> {
         let (mut opposing, mut a) = (Vec::new(), vec![Vector::default(); p.owned]);
         artificial_stress::opposing::<D, N, S>(p, 0.5, 1.0, &mut opposing);
-        artificial_stress::artificial_stress::<D, N, S, CubicSpline>(p, &neighbors(p), PAIRS, &opposing, &mut a);
+        artificial_stress::artificial_stress::<D, N, S, CubicSpline>(
+            p,
+            &neighbors::<_, _, CubicSpline>(p),
+            PAIRS,
+            &opposing,
+            &mut a,
+        );
         a
     }
     fn check<const D: usize, const N: usize, S: Space<D, N>>() {
@@ -426,9 +434,9 @@ fn shifting_evens_out() {
         let side = 14;
         let shift = |p: &Particles<D, N>, dt: f64| {
             let (mut surface, mut shift) = (Vec::new(), Vec::new());
-            shifting::surface::<D, N, CubicSpline>(p, &neighbors(p), PAIRS, &mut surface);
+            shifting::surface(p, &neighbors::<_, _, CubicSpline>(p), &mut surface);
             let how = shifting::Shifting { strength: 1.0, dt, surface: &surface };
-            shifting::shift::<D, N, CubicSpline>(p, &neighbors(p), PAIRS, how, &mut shift);
+            shifting::shift(p, &neighbors::<_, _, CubicSpline>(p), PAIRS, how, &mut shift);
             shift
         };
         let deep =

@@ -37,11 +37,11 @@ pub fn artificial_stress<const D: usize, const N: usize, S: Space<D, N>, K: Kern
         let own = opposing[i];
         let metric = S::metric(particles.x[i], pairs.spacing);
         let mut sum = Vector::default();
-        around::<D, N, K>(particles, neighbors.of_owned.of(i), scales, i, |pair| {
+        around(particles, &neighbors.support, i, |pair| {
             let both = own + opposing[pair.j];
             // Most pairs are not in tension, and powers are dear.
             if both != Sym::default() {
-                let f = (scales.value::<K>(pair.r2) / near).powf(exponent);
+                let f = (scales.value::<K>(pair.r2()) / near).powf(exponent);
                 sum += S::traction(&both, pair.d) * (f * particles.volume[pair.j] * pair.slope);
             }
         });

@@ -3,8 +3,7 @@
 use crate::algebra::Matrix;
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
-use crate::physics::Kernel;
-use crate::sweep::{Pairs, Scales, around};
+use crate::sweep::around;
 
 /// Largest norm sqrt(L:L) of a correction. Beyond it a particle has hardly any neighbours, or all in a row or a plane, and
 /// gets the unit tensor: it would amplify noise, and swing too fast for the time step. Inside the norm is sqrt(D), on flat
@@ -33,19 +32,17 @@ impl Among {
 
 /// L_i = (sum_j V_j x_ji (x) grad_i W_ij)^-1 of every owned particle, symmetric (Randles & Libersky 1996; Yang et al. 2020,
 /// Eq 26).
-pub fn correction<const D: usize, const N: usize, K: Kernel>(
+pub fn correction<const D: usize, const N: usize>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
-    pairs: Pairs,
     among: Among,
     correction: &mut Vec<Matrix<D>>,
 ) {
-    let scales = Scales::new::<D, K>(pairs.h);
     let end = among.end(particles);
     correction.clear();
     for i in 0..particles.owned {
         let mut sum = Matrix::default();
-        around::<D, N, K>(particles, neighbors.of_owned.of(i), scales, i, |pair| {
+        around(particles, &neighbors.support, i, |pair| {
             if pair.j < end {
                 sum.add_outer(-particles.volume[pair.j] * pair.slope, pair.d, pair.d);
             }

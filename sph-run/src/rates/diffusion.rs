@@ -3,8 +3,7 @@
 use crate::algebra::{Matrix, Vector};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
-use crate::physics::Kernel;
-use crate::sweep::{Pairs, Scales, around};
+use crate::sweep::around;
 use std::ops::{Add, Mul, Sub};
 
 /// What can diffuse: density, stress.
@@ -13,20 +12,18 @@ impl<T: Copy + Default + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T
 
 /// Gradient of a field at every owned particle, component by component: sum_j V_j (f_j - f_i) L_i grad_i W_ij over the
 /// material (Yang et al. 2020, Eq 25).
-pub fn gradient<const D: usize, const N: usize, K: Kernel, T: Diffusing>(
+pub fn gradient<const D: usize, const N: usize, T: Diffusing>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
-    pairs: Pairs,
     correction: &[Matrix<D>],
     field: &[T],
     gradient: &mut Vec<[T; D]>,
 ) {
-    let scales = Scales::new::<D, K>(pairs.h);
     gradient.clear();
     for i in 0..particles.owned {
         let own = field[i];
         let mut sum = [T::default(); D];
-        around::<D, N, K>(particles, neighbors.of_owned.of(i), scales, i, |pair| {
+        around(particles, &neighbors.support, i, |pair| {
             if pair.j < particles.mirror {
                 let difference = (field[pair.j] - own) * (particles.volume[pair.j] * pair.slope);
                 for a in 0..D {
@@ -49,22 +46,20 @@ pub fn gradient<const D: usize, const N: usize, K: Kernel, T: Diffusing>(
 /// each component of the stress (Feng et al. 2021). The gradients take out what is linear, so that it does not bend the
 /// profile at a free surface. What one particle gains the other loses: sum V df/dt = 0, with the sections of rings in the
 /// axisymmetric space.
-pub fn diffusion<const D: usize, const N: usize, K: Kernel, T: Diffusing>(
+pub fn diffusion<const D: usize, const N: usize, T: Diffusing>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
-    pairs: Pairs,
     strength: f64,
     field: &[T],
     gradient: &[[T; D]],
     rate: &mut Vec<T>,
 ) {
-    let scales = Scales::new::<D, K>(pairs.h);
     let along = |g: &[T; D], d: Vector<D>| (0..D).fold(T::default(), |sum, a| sum + g[a] * d.0[a]);
     rate.clear();
     for i in 0..particles.owned {
         let (own, slope) = (field[i], gradient[i]);
         let mut sum = T::default();
-        around::<D, N, K>(particles, neighbors.of_owned.of(i), scales, i, |pair| {
+        around(particles, &neighbors.support, i, |pair| {
             if pair.j < particles.mirror {
                 // x_ji . grad W/r^2 = -slope.
                 let linear = along(&slope, pair.d) + along(&gradient[pair.j], pair.d);

@@ -3,9 +3,8 @@
 use crate::algebra::{Matrix, Sym, Vector};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
-use crate::physics::Kernel;
 use crate::space::Space;
-use crate::sweep::{Pairs, Scales, around};
+use crate::sweep::{Pairs, around};
 use std::ops::Add;
 
 /// A stress, alone or times the correction of the gradient.
@@ -42,7 +41,7 @@ pub struct Viscosity {
 ///
 /// `weighted` is w sigma, or w sigma L, of every particle. The viscosity is pi = min(v_ij . x_ij, below)/r^2: of the printed
 /// Eq 22 the sign that takes energy out.
-pub fn momentum<const D: usize, const N: usize, S: Space<D, N>, K: Kernel, T: Traction<D, N>>(
+pub fn momentum<const D: usize, const N: usize, S: Space<D, N>, T: Traction<D, N>>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
     pairs: Pairs,
@@ -51,19 +50,18 @@ pub fn momentum<const D: usize, const N: usize, S: Space<D, N>, K: Kernel, T: Tr
     acceleration: &mut [Vector<D>],
     heat: &mut [f64],
 ) {
-    let scales = Scales::new::<D, K>(pairs.h);
     let nearest = 1e-6 * pairs.h * pairs.h;
     for (i, (acceleration, heat)) in acceleration.iter_mut().zip(heat).enumerate() {
         let (v, own) = (particles.v[i], weighted[i]);
         let metric = S::metric(particles.x[i], pairs.spacing);
         let mut sum = Vector::default();
         let mut power = 0.0;
-        around::<D, N, K>(particles, neighbors.of_owned.of(i), scales, i, |pair| {
+        around(particles, &neighbors.support, i, |pair| {
             let j = pair.j;
             let approach = (v - particles.v[j]).dot(pair.d).min(viscosity.below);
             // Image rings have negative radii; the mean distance from the axis weighs the viscosity.
             let mean_metric = 0.5 * (metric.abs() + S::metric(particles.x[j], pairs.spacing).abs());
-            let push = viscosity.strength * mean_metric * approach / pair.r2.max(nearest);
+            let push = viscosity.strength * mean_metric * approach / pair.r2().max(nearest);
             let weight = particles.volume[j] * pair.slope;
             sum += ((own + weighted[j]).on::<S>(pair.d) + pair.d * push) * weight;
             power += push * approach * weight;

@@ -3,8 +3,7 @@
 use crate::algebra::Vector;
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
-use crate::physics::Kernel;
-use crate::sweep::{Pairs, Scales, around};
+use crate::sweep::{Pairs, around};
 
 /// Constant A of Skillen, Lind, Stansby & Rogers (2013) where the scene asks for shifting = 1.
 const STRENGTH: f64 = 2.0;
@@ -15,18 +14,16 @@ const INSIDE: f64 = 0.85;
 const LARGEST: f64 = 0.05;
 
 /// 1 for the owned particles at a free surface, 0 for all others.
-pub fn surface<const D: usize, const N: usize, K: Kernel>(
+pub fn surface<const D: usize, const N: usize>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
-    pairs: Pairs,
     surface: &mut Vec<f64>,
 ) {
-    let scales = Scales::new::<D, K>(pairs.h);
     surface.clear();
     for i in 0..particles.owned {
         let mut divergence = 0.0;
-        around::<D, N, K>(particles, neighbors.of_owned.of(i), scales, i, |pair| {
-            divergence -= pair.r2 * particles.volume[pair.j] * pair.slope;
+        around(particles, &neighbors.support, i, |pair| {
+            divergence -= pair.r2() * particles.volume[pair.j] * pair.slope;
         });
         surface.push(if divergence < INSIDE * D as f64 { 1.0 } else { 0.0 });
     }
@@ -46,20 +43,19 @@ pub struct Shifting<'a> {
 /// The shift of every owned particle in a step, m: -A h |v| dt grad C with the concentration gradient
 /// grad C = sum_j V_j grad_i W_ij (Lind et al. 2012; Skillen et al. 2013). 0 where the support reaches a free surface: there
 /// the gradient points into the body whatever the arrangement, and would press layers against the outermost one.
-pub fn shift<const D: usize, const N: usize, K: Kernel>(
+pub fn shift<const D: usize, const N: usize>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
     pairs: Pairs,
     shifting: Shifting<'_>,
     shift: &mut Vec<Vector<D>>,
 ) {
-    let scales = Scales::new::<D, K>(pairs.h);
     let Shifting { strength, dt, surface } = shifting;
     shift.clear();
     for i in 0..particles.owned {
         let mut concentration = Vector::<D>::default();
         let mut open = surface[i];
-        around::<D, N, K>(particles, neighbors.of_owned.of(i), scales, i, |pair| {
+        around(particles, &neighbors.support, i, |pair| {
             concentration += pair.d * (particles.volume[pair.j] * pair.slope);
             open += surface[pair.j];
         });
