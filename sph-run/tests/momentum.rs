@@ -75,6 +75,7 @@ impl Job for Balance<'_> {
             particles.mass.push(2600.0 * self.scene.spacing.powi(3));
             particles.density.push(2600.0 * (1.0 + 0.05 * noise(n, 12)));
             particles.history.push(Default::default());
+            particles.work.push(Default::default());
             particles.body.push(0);
         }
         let count = particles.key.len();
