@@ -115,7 +115,9 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         let periods = Periods::new::<N, P::Space>(scene);
         periods.wrap(&mut particles.x);
         let axes = scene.space.axes();
-        let tree = Tree::build(particles.x.iter().map(|&x| P::Space::to_disk(x)), None, axes, comm);
+        let periodic = scene.periodic.map(|ends| ends.is_some());
+        let tree =
+            Tree::build(particles.x.iter().map(|&x| P::Space::to_disk(x)), None, axes, comm).with_periods(periodic);
         let mut simulation = Self {
             comm,
             material,
@@ -161,7 +163,8 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         if shifted[0] > 0 {
             let owned = &self.particles.x[..self.particles.owned];
             let axes: Vec<usize> = (0..3).filter(|&a| P::Space::axis(a).is_some()).collect();
-            self.partition.tree = Tree::build(owned.iter().map(|&x| P::Space::to_disk(x)), None, &axes, self.comm);
+            self.partition.tree = Tree::build(owned.iter().map(|&x| P::Space::to_disk(x)), None, &axes, self.comm)
+                .with_periods(self.partition.tree.periodic);
             self.partition.planned = None;
         }
         self.settle();

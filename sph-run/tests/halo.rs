@@ -38,8 +38,8 @@ const SIDE: (&str, &str) = ("x", "side = \"below\"\nat = 0.13\nslip = \"free-sli
 const MIRROR_FLOOR: (&str, &str) = ("z", "side = \"above\"\nat = 0\nslip = \"no-slip\"\nkind = \"mirror\"");
 const MIRROR_LEFT: (&str, &str) = ("x", "side = \"above\"\nat = 0\nslip = \"no-slip\"\nkind = \"mirror\"");
 const MIRROR_SIDE: (&str, &str) = ("x", "side = \"below\"\nat = 0.13\nslip = \"free-slip\"\nkind = \"mirror\"");
-/// Four spacings from a plane of symmetry, less than twice the reach: there are images of images.
-const MIRROR_NEAR: (&str, &str) = ("y", "side = \"below\"\nat = 0.04\nslip = \"free-slip\"\nkind = \"mirror\"");
+/// Three spacings from a plane of symmetry, less than twice the reach: there are images of images.
+const MIRROR_NEAR: (&str, &str) = ("y", "side = \"below\"\nat = 0.03\nslip = \"free-slip\"\nkind = \"mirror\"");
 
 /// Space with planes of symmetry and periods; the cells of the block along x, y, z; the walls by their axes.
 type Trial = (&'static str, [usize; 3], &'static [(&'static str, &'static str)]);
@@ -56,7 +56,7 @@ const SCENES: [Trial; 9] = [
     ("space = \"plane-strain\"\nperiodic = { x = { from = 0, to = 0.13 } }", [13, 1, 24], &[FLOOR]),
     ("space = \"plane-strain\"", [13, 1, 24], &[MIRROR_FLOOR, MIRROR_LEFT, MIRROR_SIDE]),
     ("space = \"axisymmetric\"", [13, 1, 24], &[MIRROR_FLOOR, MIRROR_SIDE]),
-    ("space = \"3d\"\nsymmetry = [\"y\"]", [16, 4, 8], &[FLOOR, MIRROR_NEAR]),
+    ("space = \"3d\"\nsymmetry = [\"y\"]", [16, 3, 8], &[FLOOR, MIRROR_NEAR]),
 ];
 
 fn scene((head, _, walls): Trial) -> Scene {
@@ -68,7 +68,7 @@ fn scene((head, _, walls): Trial) -> Scene {
     } else if head.contains("plane") {
         text = text.replace(box_3d, r#"box = { min = [0, 0, 0], max = ["0.1 m", 0, "0.1 m"] }"#);
     } else if walls.contains(&MIRROR_NEAR) || head.contains("y = ") {
-        text = text.replace(box_3d, r#"box = { min = [0, 0.02, 0], max = ["0.1 m", "0.04 m", "0.1 m"] }"#);
+        text = text.replace(box_3d, r#"box = { min = [0, 0.02, 0], max = ["0.1 m", "0.03 m", "0.1 m"] }"#);
     }
     for (number, (axis, wall)) in walls.iter().enumerate() {
         text += &format!("[wall.number-{number}]\naxis = \"{axis}\"\n{wall}\n");

@@ -330,6 +330,28 @@ fn neighbours_touch() {
     }
 }
 
+/// Both ends of a periodic axis are one place: the way around may be the shorter one.
+#[test]
+fn ends_of_periodic_axes_touch() {
+    let line: Vec<Point> = (0..500).map(|n| [f64::from(n), 0.0, 0.0]).collect();
+    let open = built(&line, &[0, 2], 8);
+    assert_eq!(route::eccentricity(&open, 0), 7);
+    let closed = open.with_periods([true, false, false]);
+    assert_eq!(closed.neighbours(0), [1, 7]);
+    assert_eq!(closed.neighbours(3), [2, 4]);
+    assert_eq!(route::eccentricity(&closed, 0), 4);
+    // Two axes: a corner box touches the other three corners.
+    let square: Vec<Point> = (0..900).map(|n| [f64::from(n % 30), f64::from(n / 30), 0.0]).collect();
+    let tree = built(&square, &[0, 1, 2], 16);
+    let corner = |x: [f64; 2]| tree.owner([29.0 * x[0], 29.0 * x[1], 0.0]);
+    let closed = tree.clone().with_periods([true, true, false]);
+    let beside = closed.neighbours(corner([0.0, 0.0]));
+    for other in [[0.0, 1.0], [1.0, 0.0], [1.0, 1.0]] {
+        assert!(beside.contains(&corner(other)), "{other:?}: {beside:?}");
+    }
+    assert!(tree.neighbours(corner([0.0, 0.0])).len() < beside.len());
+}
+
 /// Everything starts on one rank and goes from neighbour to neighbour until it is home.
 #[test]
 fn h3_diffusion_brings_all_home() {

@@ -2,6 +2,7 @@
 
 mod columns;
 mod stepping;
+mod walls;
 
 use formats::folder::RunFolder;
 use formats::snapshot::{self, Header, Rows};

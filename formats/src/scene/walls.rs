@@ -155,3 +155,62 @@ impl WallLattice {
 fn nearest(walls: &[Wall], x: [f64; 3]) -> f64 {
     walls.iter().map(|w| w.side * (x[w.axis] - w.at)).fold(f64::INFINITY, f64::min)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lattice(walls: &str) -> WallLattice {
+        let text = format!(
+            "space = \"plane-strain\"\nspacing = 0.01\n{walls}[material.drucker-prager]\ndensity = 2600\nyoung = 6e6\n\
+             poisson = 0.3\nfriction = 30\ncohesion = 0\n[body.box]\nbox = {{ min = [0, 0, 0], max = [0.1, 0, 0.1] }}\n\
+             [end]\ntime = 1\n"
+        );
+        WallLattice::new(&Scene::read("scene.toml", &text).expect("a sound scene"))
+    }
+
+    const FLOOR: &str =
+        "[wall.floor]\naxis = \"z\"\nat = 0\nside = \"above\"\nslip = \"no-slip\"\nvelocity = [0.5, 0, 0]\n";
+    const SIDE: &str = "[wall.side]\naxis = \"x\"\nat = 0.1\nside = \"below\"\nslip = ";
+
+    #[test]
+    fn walls_turn_what_is_extrapolated() {
+        let smooth = lattice(&format!("{FLOOR}{SIDE}\"free-slip\"\n"));
+        let moving = Parity { velocity: [-1.0; 3], motion: [1.0, 0.0, 0.0], reflected: [false; 3] };
+        assert_eq!(smooth.parity([0.05, 0.0, -0.01]), moving);
+        let side = Parity { velocity: [-1.0, 1.0, 1.0], motion: [0.0; 3], reflected: [true, false, false] };
+        assert_eq!(smooth.parity([0.11, 0.0, 0.05]), side);
+        let corner = Parity { velocity: [1.0, -1.0, -1.0], reflected: side.reflected, ..moving };
+        assert_eq!(smooth.parity([0.11, 0.0, -0.01]), corner);
+        // Two no-slip walls: the mean of their motions.
+        let rough = lattice(&format!("{FLOOR}{SIDE}\"no-slip\"\n"));
+        assert_eq!(rough.parity([0.11, 0.0, -0.01]), Parity { motion: [0.5, 0.0, 0.0], ..moving });
+    }
+
+    #[test]
+    fn mirror_walls_have_no_sites() {
+        let mixed = lattice(&format!("{SIDE}\"no-slip\"\nkind = \"mirror\"\n{FLOOR}"));
+        let x = [0.1 - 0.005, 0.0, 0.005];
+        assert!((mixed.distance(x) - 0.005).abs() < 1e-15 && (mixed.distance([0.095, 0.0, 0.5]) - 0.005).abs() < 1e-15);
+        assert!((mixed.distance_of_sites([0.095, 0.0, 0.5]) - 0.5).abs() < 1e-15);
+        let mut sites = 0;
+        mixed.near(x, 0.024, |site| {
+            assert!(mixed.position(site)[2] < 0.0);
+            sites += 1;
+        });
+        assert!(sites > 5);
+        assert!(!lattice(&format!("{SIDE}\"no-slip\"\nkind = \"mirror\"\n")).has_sites());
+    }
+
+    #[test]
+    fn sites_a_period_apart_are_exactly_that() {
+        let text = format!("periodic = {{ x = {{ from = -0.1, to = 0.2 }} }}\n{FLOOR}");
+        let lattice = lattice(&text);
+        let length = PeriodicAxis::new([-0.1, 0.2]).length;
+        for i in -40..80 {
+            let (here, there) = (lattice.position([i, 0, -1])[0], lattice.position([i + 30, 0, -1])[0]);
+            assert_eq!(there - here, length);
+            assert!((here - (f64::from(i) + 0.5) * 0.01 + 0.1).abs() < 1e-14);
+        }
+    }
+}

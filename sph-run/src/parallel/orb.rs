@@ -82,6 +82,8 @@ impl Node {
 pub struct Tree {
     nodes: Vec<Node>,
     leaves: Vec<usize>,
+    /// Axes whose two ends at infinity are the same place.
+    pub periodic: [bool; 3],
 }
 
 impl Tree {
@@ -141,7 +143,12 @@ impl Tree {
         for (k, node) in nodes.iter().enumerate().filter(|(_, node)| node.cut.is_none()) {
             leaves[node.first] = k;
         }
-        Self { nodes, leaves }
+        Self { nodes, leaves, periodic: [false; 3] }
+    }
+
+    /// The same boxes where some axes are periodic: those at both ends are neighbours.
+    pub fn with_periods(self, periodic: [bool; 3]) -> Self {
+        Self { periodic, ..self }
     }
 
     /// Number of ranks.
@@ -183,9 +190,26 @@ impl Tree {
         found
     }
 
-    /// The ranks whose closed boxes touch that of `rank`, ascending, without itself.
+    /// The ranks whose closed boxes touch that of `rank`, also across the ends of periodic axes, ascending, without
+    /// itself.
     pub fn neighbours(&self, rank: usize) -> Vec<usize> {
-        self.within(rank, 0.0)
+        let mut places = vec![*self.leaf(rank)];
+        for axis in (0..3).filter(|&axis| self.periodic[axis]) {
+            for place in places.clone() {
+                for (end, other) in [(place.low[axis], f64::INFINITY), (place.high[axis], f64::NEG_INFINITY)] {
+                    if end == -other {
+                        let mut beyond = place;
+                        (beyond.low[axis], beyond.high[axis]) = (other, other);
+                        places.push(beyond);
+                    }
+                }
+            }
+        }
+        let mut found: Vec<usize> = places.iter().flat_map(|place| self.touching(place)).collect();
+        found.sort_unstable();
+        found.dedup();
+        found.retain(|&other| other != rank);
+        found
     }
 
     /// The ranks whose boxes come within `width` of that of `rank` along every axis, ascending, without itself:
