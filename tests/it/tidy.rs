@@ -122,8 +122,10 @@ fn the_readme_names_the_exit_codes() {
 #[test]
 fn links_lead_somewhere() {
     let root = repository();
-    let mut pages: Vec<PathBuf> =
-        ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "LICENSE"].iter().map(|name| root.join(name)).collect();
+    let mut pages: Vec<PathBuf> = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "VALIDATION.md", "LICENSE"]
+        .iter()
+        .map(|name| root.join(name))
+        .collect();
     pages.retain(|page| page.is_file());
     assert!(pages.iter().any(|page| page.ends_with("README.md")));
     for folder in ["docs", "workflows", "tests"] {

@@ -132,7 +132,7 @@ fn log(study: &Study, run: &Run) -> PathBuf {
 
 /// Is there a finished run of the scene as it is now?
 fn is_done(study: &Study, run: &Run) -> bool {
-    let folder = RunFolder::new(&folder(study, run));
+    let folder = RunFolder::new(folder(study, run));
     folder.done().is_file() && std::fs::read_to_string(folder.scene()).is_ok_and(|text| text == run.scene)
 }
 

@@ -9,7 +9,7 @@ use super::{
 /// Of the inside of a panel, pixels.
 const INSIDE: [f64; 2] = [380.0, 320.0];
 /// Room left of it, above it, and below it.
-const MARGIN: [f64; 3] = [72.0, 16.0, 56.0];
+const MARGIN: [f64; 3] = [80.0, 16.0, 56.0];
 /// Of a line of the legend.
 const LINE: f64 = 20.0;
 /// Dashes of the references, one after the other.
@@ -31,13 +31,13 @@ pub fn png(known: &Known, picture: &Picture) -> Result<Vec<u8>, String> {
     let looks = looks(known, picture);
     let width = picture.panels.len() as f64 * (MARGIN[0] + INSIDE[0] + 14.0);
     let legend = LINE * looks.len().div_ceil(2) as f64;
-    let mut paper = Paper::new([width.max(466.0), MARGIN[1] + INSIDE[1] + MARGIN[2] + legend + 8.0]);
+    let mut paper = Paper::new([width.max(474.0), MARGIN[1] + INSIDE[1] + MARGIN[2] + legend + 8.0]);
     for (k, panel) in picture.panels.iter().enumerate() {
         let left = MARGIN[0] + k as f64 * (MARGIN[0] + INSIDE[0] + 14.0);
         draw(&mut paper, known, picture, panel, &looks, left)?;
     }
     for (k, look) in looks.iter().enumerate() {
-        let column = (k % 2) as f64 * (width.max(466.0) - 40.0) / 2.0;
+        let column = (k % 2) as f64 * (width.max(474.0) - 40.0) / 2.0;
         let at = [20.0 + column, MARGIN[1] + INSIDE[1] + MARGIN[2] + LINE * (k / 2) as f64 + 6.0];
         paper.line(&[at, [at[0] + 30.0, at[1]]], look.colour, 1.8, look.dash);
         if let Some(shape) = look.marker {
@@ -87,7 +87,7 @@ fn draw(
     let all = || data.iter().flat_map(|(_, points)| points);
     if all().next().is_none() {
         let middle = [left + 0.5 * INSIDE[0], MARGIN[1] + 0.5 * INSIDE[1]];
-        paper.text(&format!("{}: not run", panel.y.title), middle, Anchor::Middle);
+        paper.text(&format!("{}: no values yet", panel.y.title), middle, Anchor::Middle);
         return Ok(());
     }
     let x = Axis::new(all().map(|p| p[0]), picture.log);
@@ -216,7 +216,7 @@ fn frame(paper: &mut Paper, panel: &Panel, [x, y]: [&Axis; 2], left: f64) {
     }
     paper.line(&[[left, top], [right, top], [right, bottom], [left, bottom], [left, top]], INK, 1.0, "");
     paper.text(&panel.x.title, [0.5 * (left + right), bottom + 34.0], Anchor::Middle);
-    paper.upward(&panel.y.title, [left - 50.0, 0.5 * (top + bottom)]);
+    paper.upward(&panel.y.title, [left - 58.0, 0.5 * (top + bottom)]);
 }
 
 #[cfg(test)]

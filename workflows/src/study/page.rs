@@ -3,6 +3,7 @@
 use super::{
     chart, coverage,
     definition::{Choice, Copied, Picture, Study},
+    paper,
     results::Results,
     table,
 };
@@ -79,7 +80,8 @@ fn copied(study: &Study, copy: &Copied) -> Result<(String, Option<PathBuf>), Fai
     let made = paths::study_runs(&study.name).join(&copy.run).join("post").join(&copy.file);
     let fresh = match std::fs::read(&made) {
         Ok(png) => {
-            keep(&path, &png)?;
+            let fault = |e: String| Failure::no_input(format!("{}: {e}", paths::short(&made).display()));
+            keep(&path, &paper::repacked(&png, MOST_BYTES).map_err(fault)?)?;
             Some(path.clone())
         }
         Err(_) => None,

@@ -109,6 +109,54 @@ impl Paper {
         let size = tree.size().to_int_size().scale_by(ZOOM).ok_or("it has no size")?;
         let mut pixels = tiny_skia::Pixmap::new(size.width(), size.height()).ok_or("it is too large")?;
         resvg::render(&tree, tiny_skia::Transform::from_scale(ZOOM, ZOOM), &mut pixels.as_mut());
-        pixels.encode_png().map_err(|error| error.to_string())
+        packed(&pixels)
+    }
+}
+
+/// A picture of another program, packed as tight as those of this one; halved until it is not larger than `most` bytes.
+pub fn repacked(png: &[u8], most: usize) -> Result<Vec<u8>, String> {
+    let mut pixels = tiny_skia::Pixmap::decode_png(png).map_err(|error| error.to_string())?;
+    let mut small = packed(&pixels)?;
+    while small.len() > most && pixels.width() > 400 {
+        let mut half = tiny_skia::Pixmap::new(pixels.width() / 2, pixels.height() / 2).ok_or("it has no size")?;
+        let paint = tiny_skia::PixmapPaint { quality: tiny_skia::FilterQuality::Bilinear, ..Default::default() };
+        half.draw_pixmap(0, 0, pixels.as_ref(), &paint, tiny_skia::Transform::from_scale(0.5, 0.5), None);
+        small = packed(&half)?;
+        pixels = half;
+    }
+    Ok(small)
+}
+
+/// As opaque PNG, as small as it goes: these pictures are kept with the sources.
+fn packed(pixels: &tiny_skia::Pixmap) -> Result<Vec<u8>, String> {
+    let colours: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, pixels.width(), pixels.height());
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::Best);
+    // Most of it is one colour, which filters would only hide.
+    encoder.set_filter(png::FilterType::NoFilter);
+    let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
+    writer.write_image_data(&colours).map_err(|error| error.to_string())?;
+    writer.finish().map_err(|error| error.to_string())?;
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_packed_and_halved_where_they_must() {
+        let mut paper = Paper::new([600.0, 300.0]);
+        paper.text("Run-out ∞ √ μ φ °", [20.0, 20.0], Anchor::Start);
+        paper.line(&[[0.0, 0.0], [600.0, 300.0]], INK, 2.0, "");
+        let png = paper.png().unwrap();
+        let size = |png: &[u8]| tiny_skia::Pixmap::decode_png(png).map(|p| (p.width(), p.height())).unwrap();
+        assert_eq!(size(&png), (1200, 600));
+        assert_eq!(repacked(&png, png.len()).unwrap(), png);
+        let small = repacked(&png, png.len() - 1).unwrap();
+        assert_eq!(size(&small), (600, 300));
+        assert!(small.len() < png.len());
     }
 }

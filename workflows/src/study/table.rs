@@ -31,6 +31,18 @@ impl Known<'_> {
         expression::evaluate(text, &lookup).unwrap_or(f64::NAN)
     }
 
+    /// Is it the run that is missing, and not a reference that ends before?
+    fn needs_a_run(&self, run: &Run, text: &str) -> bool {
+        let is_known = |name: &str| {
+            let of_study = self.study.constants.iter().any(|(known, _)| known == name);
+            of_study
+                || self.study.references.iter().any(|r| r.name == name)
+                || self.study.parameters.iter().any(|p| p == name)
+        };
+        let lookup = |name: &str| if is_known(name) { self.name(run, name) } else { Some(1.0) };
+        expression::evaluate(text, &lookup).is_ok_and(f64::is_finite)
+    }
+
     fn name(&self, run: &Run, name: &str) -> Option<f64> {
         let line = self.line(run);
         let of = |value: Option<f64>| value.unwrap_or(f64::NAN);
@@ -105,7 +117,7 @@ fn single(known: &Known, table: &Tabulated, run: &Run) -> Vec<String> {
         }
         match (known.results.of(run), known.value(run, other, text)) {
             (_, value) if value.is_finite() => short(value),
-            (None, _) => NOT_RUN.into(),
+            (None, _) if known.needs_a_run(run, text) => NOT_RUN.into(),
             (Some(line), _) if line.exit != 0 => format!("failed ({})", line.exit),
             _ if other.is_some_and(|other| known.line(other).is_none()) && text.contains("other.") => NOT_RUN.into(),
             _ => DASH.into(),

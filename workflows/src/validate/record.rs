@@ -61,7 +61,7 @@ impl Sources {
     pub fn of_programs() -> Result<Self, Failure> {
         let shell = launch::shell()?;
         let read = |command: xshell::Cmd<'_>| command.quiet().ignore_stderr().read().unwrap_or_default();
-        let parts = ["Cargo.toml", "Cargo.lock", "formats/src", "sph-prep/src", "sph-run/src"];
+        let parts = ["formats/src", "sph-prep/src", "sph-run/src"];
         let commit = read(cmd!(shell, "git log -1 --format=%h --abbrev=12 -- {parts...}"));
         let changed = !read(cmd!(shell, "git status --porcelain -- {parts...}")).is_empty();
         Ok(Self { commit: if commit.is_empty() { "unknown".into() } else { commit }, changed })
