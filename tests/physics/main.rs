@@ -1,6 +1,7 @@
 //! What the programs compute, against closed forms: scenes as users write them, run by the real binaries.
 
 mod columns;
+mod flows;
 mod stepping;
 mod walls;
 
