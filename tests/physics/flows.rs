@@ -16,6 +16,7 @@ const INERTIAL: f64 = 0.279;
 
 /// A body `[low, high]` high and one period long, thrown along x.
 struct Flow {
+    period: f64,
     gravity: [f64; 2],
     z: [f64; 2],
     sound_speed: f64,
@@ -27,14 +28,14 @@ struct Flow {
 
 impl Flow {
     fn text(&self) -> String {
-        let Self { gravity: [gx, gz], z: [low, high], sound_speed, speed, rest, end } = self;
+        let Self { period, gravity: [gx, gz], z: [low, high], sound_speed, speed, rest, end } = self;
         format!(
             "space = \"plane-strain\"\nspacing = 0.001\ngravity = [{gx}, 0, {gz}]\n\
-             periodic = {{ x = {{ from = 0, to = 0.012 }} }}\n\
+             periodic = {{ x = {{ from = 0, to = {period} }} }}\n\
              [material.mu-i]\ndensity = {DENSITY}\nsound-speed = {sound_speed}\nfriction-static = {STATIC}\n\
              friction-dynamic = {DYNAMIC}\ninertial-number = {INERTIAL}\ngrain-diameter = {GRAIN}\n\
              grain-density = {GRAIN_DENSITY}\nunyielded = \"elastic\"\n\
-             [body.grains]\nbox = {{ min = [0, 0, {low}], max = [0.012, 0, {high}] }}\nvelocity = [{speed}, 0, 0]\n\
+             [body.grains]\nbox = {{ min = [0, 0, {low}], max = [{period}, 0, {high}] }}\nvelocity = [{speed}, 0, 0]\n\
              {rest}\n[end]\ntime = {end}\n[output]\nsnapshots = {end}\nhistory = {end}\n"
         )
     }
@@ -64,13 +65,14 @@ fn f1_vertical_chute() {
         + "[initial]\nstress = \"pressure\"\npressure = 600\n\
            [numerics]\nviscosity = 0.02\nviscosity-acts = \"approach\"\n";
     let flow = Flow {
+        period: 0.006,
         gravity: [GRAVITY, 0.0],
         z: [-half, half],
         sound_speed: 8.0,
         // Near the end state: its mass adjusts within about half a second.
         speed: 0.36,
         rest,
-        end: 1.5,
+        end: 1.0,
     };
     let exact = |z: f64| {
         let (steps, from) = (2000, z.abs());
@@ -90,15 +92,17 @@ fn f1_vertical_chute() {
     let (plug, plug_exact) = mean(&|z| z < 0.012);
     let (edge, edge_exact) = mean(&|z| (0.017..0.019).contains(&z));
     println!("plug {plug:.4}, exact {plug_exact:.4} m/s; at 18 mm {edge:.4}, exact {edge_exact:.4} m/s");
-    // 3 %, the row's.
+    // 3 %, the row's. Measured +1.0 % and +1.6 %; with twice the period after 1.5 s -0.1 % and +0.1 %. A viscosity of 0.01 on all pairs, the
+    // default, makes the plug 7.5 % slow: under 600 Pa the grains resist a change of speed little.
     assert!((plug / plug_exact - 1.0).abs() < 0.03, "{plug} m/s, not {plug_exact}");
     assert!((edge / edge_exact - 1.0).abs() < 0.03, "{edge} m/s, not {edge_exact}");
 }
 
 /// Bagnold's film at an angle: L2 error of its profile over the speed of its surface, and the mean speed over the exact one.
-fn film(degrees: f64, speed: f64, end: f64) -> (f64, f64) {
+fn film(degrees: f64, period: f64, speed: f64, end: f64) -> (f64, f64) {
     let (height, angle) = (0.02, degrees.to_radians());
     let flow = Flow {
+        period,
         gravity: [GRAVITY * angle.sin(), -GRAVITY * angle.cos()],
         z: [0.0, height],
         sound_speed: 10.0,
@@ -126,9 +130,10 @@ fn film(degrees: f64, speed: f64, end: f64) -> (f64, f64) {
 #[test]
 fn f2_bagnold_film() {
     // Started near the end state, which they approach within seconds. Measured: L2 1.5, 3.1, 4.5, 4.6 % of the surface's
-    // speed at 22, 24, 26, 28 degrees, mean speeds -1.9, -4.2, +1.6, +3.0 %.
-    for (degrees, speed, end) in [(22.0, 0.15, 2.0), (28.0, 2.4, 2.0)] {
-        let (error, mean) = film(degrees, speed, end);
+    // speed at 22, 24, 26, 28 degrees, mean speeds -1.9, -4.2, +1.6, +3.0 %, after 2 to 2.5 s with a period of 12 mm. At 28 degrees a
+    // period of 8 mm is too short: 8 %.
+    for (degrees, period, speed, end) in [(22.0, 0.008, 0.15, 1.5), (28.0, 0.012, 2.6, 1.8)] {
+        let (error, mean) = film(degrees, period, speed, end);
         assert!(error < 0.05, "{degrees} deg: {error}");
         assert!((mean - 1.0).abs() < 0.05, "{degrees} deg: {mean}");
     }
