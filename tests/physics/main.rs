@@ -1,6 +1,12 @@
 //! What the programs compute, against closed forms: scenes as users write them, run by the real binaries.
 
+mod collapse;
 mod columns;
+mod films;
+mod fluids;
+mod impacts;
+mod rest;
+mod slopes;
 mod stepping;
 mod walls;
 
