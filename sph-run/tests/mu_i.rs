@@ -319,3 +319,36 @@ fn the_partially_regularised_curve() {
         assert!(largest > 5.0, "{largest}");
     }
 }
+
+/// F3: the surface velocity of the Bagnold film, g = h = 1, mu_s = 0.38, mu_2 = 0.64, I0 = 0.3, d = 0.04, theta = 0.43: 2.06631
+/// (Popinet's Basilisk, `bagnold_periodic.c`). The law is asked for the shear rate that carries the weight at each depth.
+#[test]
+fn f3_dimensionless_bagnold_film() {
+    let (theta, c) = (0.43_f64, 100.0);
+    let text = format!(
+        "space = \"plane-strain\"\nspacing = 0.01\n[material.mu-i]\ndensity = 1\nsound-speed = {c}\nfriction-static = 0.38\n\
+         friction-dynamic = 0.64\ninertial-number = 0.3\ngrain-diameter = 0.04\nviscosity-cap = 1e9\n[body.film]\n\
+         box = {{ min = [0, 0, 0], max = [1, 0, 1] }}\n[end]\ntime = 1\n"
+    );
+    let scene = Scene::read("film.toml", &text).unwrap_or_else(|error| panic!("{error}"));
+    let Law::MuI(grains) = &scene.material else { unreachable!() };
+    let law = MuI::new(grains, &scene);
+    let shear_rate = |depth: f64| {
+        let (pressure, wanted) = (depth * theta.cos(), depth * theta.sin());
+        let carried = |rate: f64| stress(&law, Sym([0.0, 0.0, 0.0, 0.5 * rate]), 1.0 + pressure / (c * c), DT).0[3];
+        let (mut low, mut high) = (0.0, 1e3);
+        for _ in 0..100 {
+            let middle = 0.5 * (low + high);
+            if carried(middle) < wanted { low = middle } else { high = middle }
+        }
+        low
+    };
+    // The rate goes with the root of the depth: in s = sqrt(depth) the sum by midpoints of 2 s^2 is of second order.
+    let parts = 1000;
+    let sum = |k: usize| {
+        let s = (k as f64 + 0.5) / parts as f64;
+        2.0 * s * shear_rate(s * s) / parts as f64
+    };
+    let surface: f64 = (0..parts).map(sum).sum();
+    close(surface, 2.066_31, 1e-5);
+}

@@ -1,7 +1,13 @@
 //! What the programs compute, against closed forms: scenes as users write them, run by the real binaries.
 
+mod collapse;
 mod columns;
+mod films;
 mod flows;
+mod fluids;
+mod impacts;
+mod rest;
+mod slopes;
 mod stepping;
 mod walls;
 
