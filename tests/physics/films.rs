@@ -82,26 +82,27 @@ fn f4_a_film_below_the_angle_of_repose_stops() {
 /// F4, 33.5 degrees, above atan(mu_2) = 32.62: no friction of the law holds it.
 #[test]
 fn f4_a_film_above_the_largest_angle_runs_away() {
-    let films = film(33.5, 0.5, 0.8, 8);
+    let films = film(33.5, 0.5, 0.5, 5);
     let least = driven(33.5, FRICTION[1]);
     for pair in films.windows(2) {
         let faster = (pair[1].mean - pair[0].mean) / (pair[1].time - pair[0].time);
         // Measured 1.0 to 1.25 m/s2 here, where friction is still below mu_2; 0.179 m/s2 is what is left for good.
         assert!(faster > least, "{faster} m/s2 after {:?}", pair[0]);
     }
-    assert!(films[8].mean > 1.3, "{:?}", films[8]);
+    assert!(films[5].mean > 1.0, "{:?}", films[5]);
 }
 
-/// F5: in steady flow the friction at the base is tan(theta).
+/// F5: in steady flow the friction at the base is tan(theta). The film begins a little too fast: it is steady soonest so.
 #[test]
 fn f5_basal_friction_of_steady_flow() {
-    let films = film(24.0, 0.49, 3.0, 30);
-    let late = &films[20..];
+    let films = film(24.0, 0.6, 1.6, 32);
+    let late = &films[16..];
     let basal = late.iter().map(|film| film.basal).sum::<f64>() / late.len() as f64;
     let ratio = basal / 24f64.to_radians().tan();
-    // Momentum: what friction lacks is what still makes it faster.
+    // Momentum: what friction lacks would make it faster, and the other way round.
     let faster = (late[late.len() - 1].mean - late[0].mean) / (late[late.len() - 1].time - late[0].time);
     println!("basal friction over tan(theta) {ratio:.4}; it gains {faster:.4} m/s2");
+    // The row's 1 %.
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
     assert!(faster.abs() < 0.02, "{faster}");
 }

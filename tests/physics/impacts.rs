@@ -22,14 +22,14 @@ struct Impact {
 fn impact(kind: &str, speed: f64, numerics: &'static str) -> Impact {
     let scene = Scene {
         spacing: SPACING,
-        body: "box = { min = [0, 0, 0], max = [0.1, 0, 0.1] }\nvelocity = [0, 0, -SPEED]",
+        body: "box = { min = [0, 0, 0], max = [0.05, 0, 0.1] }\nvelocity = [0, 0, -SPEED]",
         walls: wall("floor", "z", 0.0, "above", "no-slip") + &format!("kind = \"{kind}\"\n"),
         numerics,
-        end: 0.008,
-        history: 1e-4,
+        end: 0.006,
+        history: 2e-4,
         ..Scene::default()
     };
-    let text = scene.text().replace("SPEED", &speed.to_string()).replace("snapshots = 0.008", "snapshots = 1e-4");
+    let text = scene.text().replace("SPEED", &speed.to_string()).replace("snapshots = 0.006", "snapshots = 2e-4");
     let work = WorkFolder::new();
     let folder = computed(&work, "run", &text, 0);
     let mut found = Impact { lowest: f64::INFINITY, behind: 0.0, stress: 0.0 };
@@ -45,27 +45,22 @@ fn impact(kind: &str, speed: f64, numerics: &'static str) -> Impact {
     found
 }
 
-/// F10: at 3 m/s, and at the 7.7 m/s of a column of a = 30, nothing gets behind the floor.
+/// F10: at 3 m/s, and at the 7.7 m/s of a column of a = 30, nothing gets behind the floor. F11: the stress of the impact
+/// overshoots rho c v, and beta = 1 takes some of that away, the more so the faster.
 #[test]
-fn floors_hold_what_falls_on_them() {
-    for (kind, speed, lowest) in
-        [("virtual", 3.0, 0.3), ("virtual", 7.7, 0.2), ("mirror", 3.0, 0.1), ("mirror", 7.7, -1e-6)]
-    {
-        let found = impact(kind, speed, "");
-        // Measured: 0.42, 0.31, 0.18 and 0.00 dx above it. A mirror also puts back what would cross.
-        assert!(found.behind == 0.0 && found.lowest > lowest, "{kind} {speed}: {found:?}");
-    }
-}
-
-/// F11: the stress of the impact overshoots rho c v, the more so the faster; beta = 1 takes a seventh of the overshoot away at
-/// 3 m/s, and a third of it at 7.7 m/s.
-#[test]
-fn the_quadratic_viscosity_takes_overshoot_away() {
-    for (speed, largest_share) in [(3.0, 0.95), (7.7, 0.8)] {
-        let [without, with] = ["", "quadratic-viscosity = 1"].map(|numerics| impact("virtual", speed, numerics));
-        let share = (with.stress - 1.0) / (without.stress - 1.0);
-        println!("{speed} m/s: {share:.3} of the overshoot is left");
-        assert!((1.3..1.8).contains(&without.stress), "{without:?}");
-        assert!(share > 0.0 && share < largest_share, "{share}");
+fn blocks_that_fall_on_floors() {
+    for (speed, on_virtual, on_mirror, most_left) in [(3.0, 0.3, 0.1, 0.95), (7.7, 0.2, -1e-6, 0.8)] {
+        let [plain, damped] = ["", "quadratic-viscosity = 1"].map(|numerics| impact("virtual", speed, numerics));
+        let mirror = impact("mirror", speed, "");
+        // Measured 0.42 and 0.31 dx above virtual particles, 0.21 and 0.00 dx above a mirror, which also puts back what
+        // would cross it.
+        for (found, lowest) in [(&plain, on_virtual), (&mirror, on_mirror)] {
+            assert!(found.behind == 0.0 && found.lowest > lowest, "{speed} m/s: {found:?}");
+        }
+        // Measured 1.47 and 1.51; on a mirror 1.54 and 1.62. Of what is above 1 beta leaves 0.86 and 0.69.
+        assert!((1.3..1.8).contains(&plain.stress), "{plain:?}");
+        let left = (damped.stress - 1.0) / (plain.stress - 1.0);
+        println!("{speed} m/s: {left:.3} of the overshoot is left");
+        assert!(left > 0.0 && left < most_left, "{left}");
     }
 }

@@ -4,7 +4,7 @@ use crate::{history, last, wall};
 use formats::snapshot;
 use tests::{WorkFolder, computed};
 
-/// What becomes of half a heap 0.1 m high within ten sqrt(H/g), in spacings where it is a length.
+/// What becomes of half a heap 0.1 m high within eight sqrt(H/g), in spacings where it is a length.
 #[derive(Debug)]
 struct Heap {
     /// How far the toe has come.
@@ -26,7 +26,7 @@ fn heap(cone: &str, angle: f64, stress: &str) -> Heap {
          cone = \"{cone}\"\nmean-stress = \"density\"\n\
          [body.heap]\nwedge = {{ corner = [0, 0, 0], size = [{}, 0, {height}], falls = \"right\" }}\n{}\
          [initial]\nstress = \"{stress}\"\n[numerics]\ndensity-diffusion = 0.1\n\
-         [end]\ntime = 1\n[output]\nsnapshots = 1\nhistory = 0.02\n",
+         [end]\ntime = 0.8\n[output]\nsnapshots = 0.8\nhistory = 0.02\n",
         height / angle.to_radians().tan(),
         wall("floor", "z", 0.0, "above", "no-slip"),
     );
@@ -48,15 +48,13 @@ fn heap(cone: &str, angle: f64, stress: &str) -> Heap {
     heap
 }
 
-/// E6: at 0.8 of the mobilised angle a heap does not move, whatever the stress it starts with.
+/// E6: at 0.8 of the mobilised angle a heap does not move. From no stress at all, so that its weight comes on at once.
 #[test]
 fn e6_a_heap_below_the_angle_of_repose() {
     // The cone whose mobilised angle is the friction angle, 30 degrees.
-    for stress in ["hydrostatic", "zero"] {
-        let heap = heap("plane-strain-isochoric", 24.0, stress);
-        // Measured 0.06 dx and 0.16 to 0.20 dx; 3e-7 and 1e-6.
-        assert!(heap.toe < 1.0 && heap.moved < 0.5 && heap.kinetic < 1e-5, "{heap:?}");
-    }
+    let heap = heap("plane-strain-isochoric", 24.0, "zero");
+    // Measured 0.06 dx and 0.20 dx (0.16 from a hydrostatic stress); 1e-6.
+    assert!(heap.toe < 1.0 && heap.moved < 0.5 && heap.kinetic < 1e-5, "{heap:?}");
 }
 
 /// E7: three degrees below the angle that the cone mobilises in plane strain a slope stands, three above it flows. The cone
@@ -65,9 +63,9 @@ fn e6_a_heap_below_the_angle_of_repose() {
 fn e7_slopes_below_and_above_the_mobilised_angle() {
     for (cone, mobilised) in [("plane-strain-isochoric", 30.0), ("compression", 43.9)] {
         let [stands, flows] = [-3.0, 3.0].map(|more| heap(cone, mobilised + more, "hydrostatic"));
-        // Measured 0.14 and 0.11 dx; of the energy 0.3 %, and 2.3 % where the tip of the steeper heap crumbles.
+        // Measured 0.14 and 0.03 dx; of the energy 0.3 %, and 1.8 % where the tip of the steeper heap crumbles.
         assert!(stands.toe < 0.5 && stands.lost < 0.04, "{cone}: {stands:?}");
-        // Measured 3.0 and 4.7 dx; 13 and 20 %.
+        // Measured 3.0 and 4.3 dx; 12 and 20 %.
         assert!(flows.toe > 2.0 && flows.lost > 0.08, "{cone}: {flows:?}");
     }
 }
