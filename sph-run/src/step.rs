@@ -109,7 +109,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     }
 
     /// Accelerations of the owned particles, from the stresses around them.
-    pub fn accelerate(&mut self) {
+    fn accelerate(&mut self) {
         let spacing = self.parameters.spacing;
         let mut a = std::mem::take(&mut self.particles.a);
         let (p, buffers) = (&self.particles, &mut self.buffers);

@@ -43,7 +43,7 @@ fn start<'a, const D: usize, const N: usize, P: Physics<D, N, Material = Drucker
     let particles = Particles::from_rows::<P::Space>(rows);
     let count = particles.owned as u64;
     let mut run = Simulation::new(comm, scene, DruckerPrager::new(law), particles, count, Clock::default());
-    run.accelerate();
+    run.begin();
     run
 }
 

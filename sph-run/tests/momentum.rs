@@ -84,7 +84,7 @@ impl Job for Balance<'_> {
         let mut simulation =
             Simulation::<D, N, P>::new(self.comm, self.scene, material, particles, total, Clock::default());
         simulation.fill(Fields::Stress);
-        simulation.accelerate();
+        simulation.begin();
 
         let p = &simulation.particles;
         let mut sums = vec![Sum::new(1.0); 2 * D + 1];
