@@ -27,7 +27,7 @@ pub fn id(key: u64) -> u64 {
 pub struct Particles<const D: usize, const N: usize> {
     /// End of the owned particles.
     pub owned: usize,
-    /// End of the copies of other ranks' particles.
+    /// End of the copies: of other ranks' particles, and of own ones across periodic borders.
     pub halo: usize,
     /// End of the mirror images; wall particles follow.
     pub mirror: usize,
@@ -42,7 +42,6 @@ pub struct Particles<const D: usize, const N: usize> {
     pub volume: Vec<f64>,
     /// Stress, Pa.
     pub stress: Vec<Sym<N>>,
-
     /// Viscosity between particles, Pa s; of laws without one it is never filled.
     pub viscosity: Vec<f64>,
 

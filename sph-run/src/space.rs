@@ -8,7 +8,7 @@ use std::fmt::Debug;
 /// What the pair sweep and the updates need to know of a space.
 ///
 /// `D` coordinates, `N` stress components. A particle's `metric` w is 1, or the radius in the axisymmetric space:
-/// with it one work-conjugate pair of operators serves all spaces (see `sweep.rs`).
+/// with it one work-conjugate pair of operators serves all spaces (see [`crate::rates`]).
 pub trait Space<const D: usize, const N: usize>: Copy + Debug + Default + Send + Sync + 'static {
     /// Its name on disk.
     const KIND: Kind;

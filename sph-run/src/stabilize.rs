@@ -1,5 +1,6 @@
 //! What a scene may ask for beyond the plain scheme: corrected gradients, diffusion of density and stress, artificial
-//! stress, viscosity of impacts, shifting. Each is off unless asked for, and then costs sweeps of its own: the plain
+//! stress, viscosity of impacts, shifting. Each is off unless the law or the scene asks
+//! for it, and then costs sweeps of its own: the plain
 //! scheme pays nothing.
 
 use crate::algebra::{Matrix, Sym, Vector};

@@ -15,7 +15,8 @@ use crate::space::Space;
 use crate::timestep::Plan;
 
 impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
-    /// Accelerations at the very start. Collective.
+    /// Accelerations at the very start, of stress and artificial viscosity: viscosities between particles follow from the
+    /// first strain. Collective.
     pub fn begin(&mut self) {
         self.find_support();
         self.refresh_correction();
@@ -82,8 +83,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         let p = &mut self.particles;
         let viscous = self.material.pair_viscosity().is_some();
         for (i, gradient) in self.gradient.iter().enumerate() {
-            // In the middle of the step, where the velocities are: dv/dx_mid = L (I - L dt/2)^-1, to second order. At its end a
-            // rotation by omega dt would seem to dilate by (omega dt)^2/2 along each axis, every step.
+            // In the middle of the step, where the velocities are (Hughes & Winget 1980): dv/dx_mid = L (I - L dt/2)^-1, to
+            // second order. At its end a rotation by omega dt would seem to dilate by (omega dt)^2/2 along each axis.
             let gradient = &gradient.with_square(0.5 * dt);
             let middle = p.x[i] - p.v[i] * (0.5 * dt);
             let strain = P::Space::strain_rate(gradient, middle, p.v[i], spacing) * dt;

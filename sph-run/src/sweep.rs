@@ -1,4 +1,5 @@
-//! The only loops over pairs of particles: one finds those within the support, the other goes through them. Sums gather
+//! The only loops over pairs of particles: one finds those within the support, one goes through them, one takes the
+//! kernel's values around a wall particle. Sums gather
 //! into one particle, over its neighbours in ascending key: they, and so the bits of the answer, do not depend on ranks,
 //! on lists, or on restarts. What is summed is in [`crate::rates`].
 
@@ -7,7 +8,7 @@ use crate::neighbors::Lists;
 use crate::particles::Particles;
 use crate::physics::Kernel;
 
-/// What the sweeps need to know beside the particles.
+/// What rates need to know beside the particles.
 #[derive(Clone, Copy, Debug)]
 pub struct Pairs {
     /// Smoothing length h, m.

@@ -156,8 +156,8 @@ fn mu_i(table: Table<'_>) -> Option<MuI> {
     let faults = table.faults;
     table.finish();
     let (density, sound_speed, friction_static) = (density?.value, sound_speed?.value, friction_static?.value);
-    // That of a solid whose P waves have the speed c in bulk alone and Poisson's ratio 0.3: G/K = 3/2 (1 - 2 nu)/(1 + nu).
     let regularised = curve.as_ref().is_some_and(|found| found.value == Curve::PartiallyRegularised);
+    // Poisson's ratio 0.3 with the bulk modulus K = rho c^2: G/K = 3/2 (1 - 2 nu)/(1 + nu).
     let shear = or(shear, 6.0 / 13.0 * density * sound_speed * sound_speed);
     let law = MuI {
         density,

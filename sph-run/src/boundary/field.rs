@@ -12,12 +12,8 @@ pub enum Field<'a, const D: usize, const N: usize> {
     Place(&'a mut [Vector<D>]),
     /// Reflected; by a no-slip wall all of it, relative to the wall.
     Velocity(&'a mut [Vector<D>]),
-    /// Another vector, such as a gradient: reflected.
-    Direction(&'a mut [Vector<D>]),
     /// Reflected, but kept as it is by a no-slip wall.
     Stress(&'a mut [Sym<N>]),
-    /// A tensor that follows from places alone: reflected.
-    Matrix(&'a mut [Matrix<D>]),
 }
 
 /// x' = sign x + offset, component by component.
@@ -91,15 +87,11 @@ impl<const D: usize, const N: usize> Reflection<D, N> {
     pub fn velocity(&self, v: Vector<D>) -> Vector<D> {
         self.velocity.apply(v)
     }
-    /// A [`Field::Direction`] of the image.
-    pub fn direction(&self, d: Vector<D>) -> Vector<D> {
-        Vector(std::array::from_fn(|a| self.place.sign[a] * d.0[a]))
-    }
     /// A [`Field::Stress`] of the image.
     pub fn stress(&self, s: Sym<N>) -> Sym<N> {
         Sym(std::array::from_fn(|a| self.stress.0[a] * s.0[a]))
     }
-    /// A [`Field::Matrix`] of the image.
+    /// A tensor that follows from places alone, at the image.
     pub fn matrix(&self, m: Matrix<D>) -> Matrix<D> {
         let sign = &self.place.sign;
         Matrix(std::array::from_fn(|a| std::array::from_fn(|b| sign[a] * sign[b] * m.0[a][b])))

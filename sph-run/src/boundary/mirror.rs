@@ -148,9 +148,7 @@ impl<const D: usize, const N: usize> Mirrors<D, N> {
             Field::Scalar(field) => self.each(field, first, |_, scalar| scalar),
             Field::Place(field) => self.each(field, first, Reflection::place),
             Field::Velocity(field) => self.each(field, first, Reflection::velocity),
-            Field::Direction(field) => self.each(field, first, Reflection::direction),
             Field::Stress(field) => self.each(field, first, Reflection::stress),
-            Field::Matrix(field) => self.each(field, first, Reflection::matrix),
         });
     }
 

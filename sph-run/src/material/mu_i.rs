@@ -12,7 +12,7 @@ const SLOWEST: f64 = 1e-12;
 /// give sqrt(2) times the friction).
 ///
 /// Where the material does not flow, the viscosity mu p/|gdot| grows without bound. It is either capped, or the deviator
-/// is that of an elastic solid until sqrt(J2) reaches mu_s p (Dunatunga & Kamrin 2015). Without pressure there is no stress.
+/// is that of an elastic solid until sqrt(J2) reaches mu_s p (Dunatunga & Kamrin 2015). Without pressure there is no shear stress.
 #[derive(Clone, Copy, Debug)]
 pub struct MuI {
     density: f64,

@@ -1,5 +1,6 @@
 //! Copies of other ranks' particles within reach of this rank's, and of its own across periodic borders: planned when
-//! neighbour lists are built, refreshed twice a step.
+//! neighbour lists are built, refreshed twice a step, and by
+//! what stabilisers spread.
 
 use crate::algebra::Vector;
 use crate::boundary::field::{Field, Spread, Words};
@@ -133,9 +134,8 @@ impl<const D: usize> Halo<D> {
             match field {
                 Field::Scalar(field) => self.pack(words, here, field, |scalar, _| scalar),
                 Field::Place(field) => self.pack(words, here, field, |x, shift| x + shift),
-                Field::Velocity(field) | Field::Direction(field) => self.pack(words, here, field, |v, _| v),
+                Field::Velocity(field) => self.pack(words, here, field, |v, _| v),
                 Field::Stress(field) => self.pack(words, here, field, |stress, _| stress),
-                Field::Matrix(field) => self.pack(words, here, field, |matrix, _| matrix),
             }
         });
 
@@ -148,11 +148,10 @@ impl<const D: usize> Halo<D> {
             before += count(&field);
             match field {
                 Field::Scalar(field) => self.unpack(words, here, &mut field[copies.clone()]),
-                Field::Place(field) | Field::Velocity(field) | Field::Direction(field) => {
+                Field::Place(field) | Field::Velocity(field) => {
                     self.unpack(words, here, &mut field[copies.clone()]);
                 }
                 Field::Stress(field) => self.unpack(words, here, &mut field[copies.clone()]),
-                Field::Matrix(field) => self.unpack(words, here, &mut field[copies.clone()]),
             }
         });
     }
@@ -221,9 +220,8 @@ impl<const D: usize> Halo<D> {
 fn count<const D: usize, const N: usize>(field: &Field<'_, D, N>) -> usize {
     match field {
         Field::Scalar(_) => 1,
-        Field::Place(_) | Field::Velocity(_) | Field::Direction(_) => D,
+        Field::Place(_) | Field::Velocity(_) => D,
         Field::Stress(_) => N,
-        Field::Matrix(_) => D * D,
     }
 }
 

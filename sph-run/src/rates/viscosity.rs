@@ -8,7 +8,7 @@ use crate::particles::Particles;
 use crate::space::Space;
 use crate::sweep::{Pairs, around};
 
-/// Viscous stress of a fluid of variable viscosity (Szewc 2017, Eq 9, in volume form), m/s2:
+/// Adds the acceleration by the viscosity of a fluid of variable viscosity (Szewc 2017, Eq 9, in volume form), m/s2:
 ///
 /// ```text
 /// 1/rho_i sum_j V_j (mu_i + mu_j) x_ij . grad_i W_ij/(r^2 + eta^2) v_ij      eta = 0.01 h
@@ -49,7 +49,8 @@ pub fn between_particles<const D: usize, const N: usize, S: Space<D, N>>(
     }
 }
 
-/// Quadratic artificial viscosity of impacts (von Neumann & Richtmyer 1950; Monaghan 1992): on approaching pairs the pressure
+/// Quadratic artificial viscosity of impacts (von Neumann & Richtmyer 1950; Monaghan 1992): on approaching pairs the
+/// pressures of both add up to
 /// beta rho0 (h v_ij . x_ij/(r^2 + 0.01 h^2))^2. `strength`: beta rho0 h^2, Pa s2.
 pub fn on_impact<const D: usize, const N: usize, S: Space<D, N>>(
     particles: &Particles<D, N>,

@@ -118,7 +118,7 @@ fn single(known: &Known, table: &Tabulated, run: &Run) -> Vec<String> {
         match (known.results.of(run), known.value(run, other, text)) {
             (_, value) if value.is_finite() => short(value),
             (None, _) if known.needs_a_run(run, text) => NOT_RUN.into(),
-            (Some(line), _) if line.exit != 0 => format!("failed ({})", line.exit),
+            (Some(line), _) if line.exit != 0 && known.needs_a_run(run, text) => format!("failed ({})", line.exit),
             _ if other.is_some_and(|other| known.line(other).is_none()) && text.contains("other.") => NOT_RUN.into(),
             _ => DASH.into(),
         }
