@@ -209,7 +209,8 @@ const BOX_OF_MIRRORS: &str = "[wall.floor]\naxis = \"z\"\nat = 0\nside = \"above
 
 /// Thrown against mirror walls, nothing stays behind them.
 fn what_gets_behind_a_mirror_is_put_back(comm: &Communicator) {
-    let scene = scene("space = \"plane-strain\"\nsymmetry = [\"x\"]", BOX_OF_MIRRORS, 0.0);
+    let left = "[wall.left]\naxis = \"x\"\nat = 0\nside = \"above\"\nslip = \"free-slip\"\nkind = \"mirror\"\n";
+    let scene = scene("space = \"plane-strain\"", &(left.to_owned() + BOX_OF_MIRRORS), 0.0);
     let mut rows = block::<2, 4, PlaneStrain>([10, 1, 10], 0.0, 0.0, [0.0; 3]);
     // One just before the side, one just above the floor, faster than the others could turn them in a step.
     (rows.position[95][0], rows.velocity[95][0]) = (10.0 * DX - 1e-6, 8.0);

@@ -25,7 +25,7 @@ fn couette(kind: &str, spacing: f64) -> Errors {
         cohesion: 1e6,
         body: "box = { min = [0, 0, 0], max = [0.24, 0, 1] }",
         walls: wall("floor", 0.0, "above") + &wall("lid", 1.0, "below") + &format!("velocity = [{LID}, 0, 0]\n"),
-        numerics: "damping = 100",
+        numerics: "damping = 100\ndamping-in-flow = \"forced\"",
         end: 0.4,
         ..Scene::default()
     };
