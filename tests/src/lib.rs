@@ -2,6 +2,7 @@
 //! comparing results.
 
 pub mod python;
+pub mod trial;
 
 use formats::{folder::RunFolder, snapshot};
 use std::ffi::OsStr;

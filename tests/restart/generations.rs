@@ -1,0 +1,1 @@
+//! One valid generation is always there, and one that is damaged is noticed.
