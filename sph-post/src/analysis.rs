@@ -75,7 +75,7 @@ pub struct Analysis {
     pub scene: Scene,
     /// Its text.
     pub text: String,
-    /// The SHA-256 of its text.
+    /// Its hash ([`Scene::hash`]).
     pub hash: String,
     /// What of it matters here.
     pub geometry: Geometry,
