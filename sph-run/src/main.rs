@@ -8,14 +8,19 @@ use formats::lock::RunLock;
 use formats::scene::Scene;
 use mpi::traits::Communicator as _;
 use sph_run::cli::Cli;
+use sph_run::deadline::Deadline;
 use sph_run::{check, dispatch};
 use sph_run::error::RunError;
 use sph_run::limits::Limits;
 use sph_run::parallel::agree::{agree, share_text};
 use sph_run::resume::{Past, Start, read_scene};
 use sph_run::run::{Outcome, Run};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
 fn main() {
+    let begun = Instant::now();
     let signalled = Limits::watch_signals();
     let cli = Cli::try_parse();
     if let Ok(Cli { check: true, run, .. }) = &cli {
@@ -28,7 +33,7 @@ fn main() {
     let comm = universe.world();
     abort_all_ranks_on_panic();
     let code = match cli {
-        Ok(cli) => launch(&comm, &cli, signalled),
+        Ok(cli) => launch(&comm, &cli, signalled, begun),
         Err(error) => {
             if comm.rank() == 0 {
                 let _ = error.print();
@@ -49,10 +54,10 @@ fn abort_all_ranks_on_panic() {
     }));
 }
 
-fn launch(comm: &Communicator, cli: &Cli, signalled: std::sync::Arc<std::sync::atomic::AtomicBool>) -> i32 {
+fn launch(comm: &Communicator, cli: &Cli, signalled: Arc<AtomicBool>, begun: Instant) -> i32 {
     let folder = RunFolder::new(&cli.run);
     let limits = Limits::new(signalled, &folder);
-    match run(comm, cli, &folder, limits) {
+    match run(comm, cli, &folder, limits, begun) {
         Ok(outcome) => {
             if comm.rank() == 0 {
                 println!("{}", folder.path().display());
@@ -71,11 +76,11 @@ fn launch(comm: &Communicator, cli: &Cli, signalled: std::sync::Arc<std::sync::a
     }
 }
 
-fn run(comm: &Communicator, cli: &Cli, folder: &RunFolder, limits: Limits) -> Result<Outcome, RunError> {
+fn run(comm: &Communicator, cli: &Cli, folder: &RunFolder, limits: Limits, begun: Instant) -> Result<Outcome, RunError> {
     // Before the lock, whose folder need not be there.
     agree(comm, || read_scene(&folder.scene()))?;
     let lock = agree(comm, || Ok(RunLock::acquire_within(&folder.lock(), cli.lock_patience)?))?;
-    let allowance = agree(comm, || Ok(Allowance::of(cli.wall_limit)))?.unwrap_or_default();
+    let deadline = agree(comm, || Ok(Deadline::find(cli.wall_limit, begun, cli.quiet)))?.unwrap_or_default();
     let mut past = Past::default();
     let start = share_text(comm, || {
         Ok(match Start::find(folder, cli, comm.size() as u64)? {
@@ -96,6 +101,6 @@ fn run(comm: &Communicator, cli: &Cli, folder: &RunFolder, limits: Limits) -> Re
     let scene = Scene::read(&folder.scene().display().to_string(), &start.scene)?;
     let scene_hash = Scene::hash(&start.scene);
     let lock = lock.as_ref();
-    let run = Run { comm, cli, folder, scene: &scene, scene_hash, start, past, limits, allowance, lock };
+    let run = Run { comm, cli, folder, scene: &scene, scene_hash, start, past, limits, deadline, lock };
     dispatch::resolve(&scene, run)
 }

@@ -6,7 +6,7 @@ use crate::error::RunError;
 use crate::simulation::Clock;
 use formats::folder::RunFolder;
 use formats::journal::Event;
-use formats::scene::{Change, Scene};
+use formats::scene::{Change, Output, Scene};
 use formats::{checkpoint, disk, snapshot::FileError};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -101,8 +101,8 @@ impl Start {
         let scene = Scene::read(&folder.scene().display().to_string(), &self.scene)?;
         self.over = false;
         if !self.fresh() {
-            self.clock.line_event = next_event(self.clock.time, scene.output.history);
-            self.clock.snapshot_event = next_event(self.clock.time, scene.output.snapshots);
+            self.clock.line_event = Output::first_after(scene.output.history, self.clock.time);
+            self.clock.snapshot_event = Output::first_after(scene.output.snapshots, self.clock.time);
         }
         Ok(())
     }
@@ -158,11 +158,6 @@ fn compare(folder: &RunFolder, then: &str, now: &str) -> Result<Vec<Change>, Run
         true => Ok(Vec::new()),
         false => Ok(Scene::changes(&folder.scene().display().to_string(), then, now)?),
     }
-}
-
-/// The number of the first multiple of an interval that comes after `time`, by more than rounding.
-fn next_event(time: f64, interval: f64) -> u64 {
-    (time / interval + 1e-9).floor() as u64 + 1
 }
 
 /// The clock in a manifest, and whether the run is over. Floats are stored as their bits: decimal text would be a

@@ -1,6 +1,7 @@
 //! A run from start or checkpoint to its end: what is due when.
 
 use crate::cli::{Cadence, Cli};
+use crate::deadline::Deadline;
 use crate::dispatch::Job;
 use crate::error::{Fault, RunError};
 use crate::limits::{Limits, Reason};
@@ -13,7 +14,6 @@ use crate::physics::Physics;
 use crate::progress::Progress;
 use crate::report::Scales;
 use crate::resume::{Past, Start};
-use crate::scheduler::Allowance;
 use crate::simulation::Simulation;
 use crate::timestep::Requests;
 use formats::folder::RunFolder;
@@ -46,7 +46,7 @@ pub struct Run<'a> {
     pub limits: Limits,
     /// What follows counts on rank 0 only.
     pub past: Past,
-    pub allowance: Allowance,
+    pub deadline: Deadline,
     /// On no other rank there is one.
     pub lock: Option<&'a RunLock>,
 }
@@ -78,7 +78,7 @@ impl Job for Run<'_> {
         let then = std::mem::take(&mut self.past.outputs);
         let outputs = agree(self.comm, || Outputs::open(self.folder, then, self.scene.space))?;
         let progress = Progress::new(self.cli.quiet || rank != 0, &simulation.clock, self.scene.end.time, count);
-        let pace = Pace::new(self.cli.mtbf, self.past.write_seconds.map(Duration::from_secs_f64));
+        let pace = Pace::new(self.past.write_seconds.map(Duration::from_secs_f64));
         let scales = Scales::new(self.scene);
         let (checkpointed, checkpoint_step) = (Instant::now(), simulation.clock.step);
         let course =
@@ -128,7 +128,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
                 continue;
             }
             self.simulation.step(&plan);
-            self.pace.step(begun.elapsed());
+            self.pace.stepped(begun.elapsed());
             over = self.outputs_due()?;
             self.progress.tell(&self.simulation.clock);
             self.report_progress();
@@ -151,7 +151,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         if self.job.lock.is_some() {
             let (clock, ranks) = (&self.simulation.clock, self.job.comm.size() as u64);
             let now = Event::now(event, clock.step, clock.time, ranks);
-            let _ = Event { job: self.job.allowance.job.clone(), what: what.into(), ..now }.append(self.job.folder);
+            let _ = Event { job: self.job.deadline.job.clone(), what: what.into(), ..now }.append(self.job.folder);
         }
     }
 
@@ -161,20 +161,16 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         if job.lock.is_some() && self.progress.due() {
             let ranks = job.comm.size() as u64;
             let report = self.progress.report(&self.simulation.clock, ranks);
-            let (job_id, deadline) = (job.allowance.job.clone(), job.allowance.deadline_text());
+            let (job_id, deadline) = (job.deadline.job.clone(), job.deadline.text());
             let _ = journal::Progress { job: job_id, deadline, ..report }.write(job.folder);
         }
     }
 
     /// A limit that leaves no time for a step and for ending would be reached again and again.
     fn check_wall_limit(&self) -> Result<(), RunError> {
-        match self.job.allowance.left() {
-            Some(left) if left < self.pace.margin() => Err(RunError::LimitTooShort {
-                source: self.job.allowance.source.clone(),
-                left: left.as_secs_f64(),
-                margin: self.pace.margin().as_secs_f64(),
-            }),
-            _ => Ok(()),
+        match self.job.deadline.left() {
+            Some(left) => self.pace.check_limit(left).map_err(RunError::LimitTooShort),
+            None => Ok(()),
         }
     }
 
@@ -254,7 +250,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             outputs.log_performance(&format!("{time:e},{step},{wall:.3},{rate:.4e},{imbalance:.4},{ranks}\n"));
             Ok(())
         })?;
-        self.pace.write(begun.elapsed());
+        self.pace.wrote_snapshot(begun.elapsed());
         Ok(())
     }
 
@@ -273,9 +269,9 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
                 step > self.checkpoint_step && step.is_multiple_of(n)
             }
             Cadence::Wall(interval) => root && since >= interval,
-            Cadence::Auto => root && since >= self.pace.interval(),
+            Cadence::Auto => root && since >= self.pace.checkpoint_interval(self.job.cli.mtbf),
         };
-        let out_of_time = self.job.allowance.left().is_some_and(|left| left <= self.pace.margin());
+        let out_of_time = self.job.deadline.left().is_some_and(|left| left <= self.pace.margin());
         let stop = match self.job.limits.stop(root) {
             None if out_of_time => Some(Reason::WallLimit),
             asked => asked,
@@ -299,7 +295,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             clock: &crate::resume::clock_to_json(&self.simulation.clock, over),
             outputs: outputs.as_ref(),
             scene: &job.start.scene,
-            job: job.allowance.job.as_deref(),
+            job: job.deadline.job.as_deref(),
             keep: checkpoint::Keep {
                 newest: job.cli.checkpoint_keep as usize,
                 archive: job.cli.checkpoint_archive,
@@ -308,7 +304,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         };
         let generation = checkpoint::commit(&new, job.comm)?;
         self.note("checkpoint", &format!("gen-{generation:06} in {:.3} s", begun.elapsed().as_secs_f64()));
-        self.pace.checkpoint(begun.elapsed());
+        self.pace.wrote_checkpoint(begun.elapsed());
         self.checkpointed = Instant::now();
         self.checkpoint_step = self.simulation.clock.step;
         Ok(())
