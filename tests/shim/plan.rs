@@ -7,7 +7,7 @@
 //! | `TALUS_FAULT_PROGRAM` | only in a program of this name; `sph-run` where it is not set |
 //! | `TALUS_FAULT_RANK` | only on this MPI rank (0 without MPI); on all where it is not set |
 //! | `TALUS_FAULT_CALLS` | names of [`Kind`], with commas; all that change something where it is not set |
-//! | `TALUS_FAULT_FILES` | only paths in the folder that contain this text |
+//! | `TALUS_FAULT_FILES` | only paths in the folder of this form: `?` stands for one letter, `*` for any number of them |
 //! | `TALUS_FAULT_AT` | the number of the call, from 1, counted in each process on its own |
 //! | `TALUS_FAULT_DO` | `count`, `kill`, `torn`, `short`, `flip`, `suspend`, `sleep:MS`, `fail:CODE`, `fail-on:CODE` |
 //!
@@ -147,7 +147,7 @@ impl Plan {
             log: variable("LOG")? + "\0",
             rank,
             calls: Kind::ALL.iter().filter(|kind| wanted(kind)).map(|(_, kind)| *kind).collect(),
-            files: variable("FILES").unwrap_or_default(),
+            files: variable("FILES").unwrap_or_else(|| "*".into()),
             at: variable("AT").and_then(|at| at.parse().ok()).unwrap_or(0),
             deed,
             words,
@@ -157,7 +157,7 @@ impl Plan {
     fn judge(&self, kind: Kind, place: Place, bytes: usize) -> Option<Verdict> {
         let path = place.path()?;
         let path = path.strip_prefix(&self.folder)?;
-        if !path.contains(&self.files) {
+        if !fits(self.files.as_bytes(), path.as_bytes()) {
             return None;
         }
         let number = COUNTED.fetch_add(1, Ordering::SeqCst) + 1;
@@ -194,5 +194,17 @@ impl Plan {
                 Some(Verdict::Fail(code))
             }
         }
+    }
+}
+
+/// Is a path of a form?
+fn fits(form: &[u8], path: &[u8]) -> bool {
+    match (form.split_first(), path.split_first()) {
+        (None, None) => true,
+        (Some((b'*', rest)), None) => fits(rest, path),
+        (Some((b'*', rest)), Some((_, shorter))) => fits(rest, path) || fits(form, shorter),
+        (Some((b'?', rest)), Some((_, shorter))) => fits(rest, shorter),
+        (Some((letter, rest)), Some((first, shorter))) => letter == first && fits(rest, shorter),
+        _ => false,
     }
 }
