@@ -82,7 +82,6 @@ impl Start {
         if clear_stale_stop_file(folder) {
             eprintln!("sph-run: warning: a STOP file from before this launch is removed; make it anew to stop the run");
         }
-        let _ = fs::remove_file(folder.to_continue());
         if !start.fresh() && !cli.quiet {
             eprintln!("sph-run: resuming at t = {:.4} s, step {}", start.clock.time, start.clock.step);
         }

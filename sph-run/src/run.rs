@@ -108,7 +108,12 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         }
         self.note(if self.job.start.fresh() { "start" } else { "resume" }, "");
         let mut over = self.outputs_due()?;
-        agree(self.job.comm, || self.check_wall_limit())?;
+        agree(self.job.comm, || {
+            self.check_wall_limit()?;
+            // From here on the run is under way.
+            let _ = std::fs::remove_file(self.job.folder.to_continue());
+            Ok(())
+        })?;
         while !over {
             let begun = Instant::now();
             if self.job.cli.stop_after_steps.is_some_and(|n| self.simulation.clock.step >= first + n) {
@@ -345,6 +350,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         if let (Err(error), 0) = (written, self.job.comm.rank()) {
             eprintln!("sph-run: warning: the faulty state could not be kept: {error}");
         }
+        self.note("failed", &fault.to_string());
         RunError::Numerical { fault, state }
     }
 }
