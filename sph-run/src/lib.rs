@@ -5,7 +5,9 @@
 
 pub mod algebra;
 pub mod boundary;
+pub mod check;
 pub mod cli;
+pub mod deadline;
 pub mod dispatch;
 pub mod error;
 pub mod exact;
