@@ -2,3 +2,5 @@
 
 mod faults;
 mod generations;
+mod outputs;
+mod scene;
