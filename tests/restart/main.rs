@@ -1,0 +1,3 @@
+//! No work is ever lost: whatever happens to a run, the same command goes on, and ends with the same bits.
+
+mod limits;
