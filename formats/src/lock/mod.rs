@@ -133,6 +133,11 @@ impl RunLock {
         }
     }
 
+    /// What the lock says of this process; its token tells this launch from any other.
+    pub fn holder(&self) -> &Holder {
+        &self.holder
+    }
+
     fn held(path: &Path, holder: Holder) -> Result<Self, LockError> {
         file::sweep(path);
         match Heart::start(path, &holder) {
