@@ -1,6 +1,7 @@
 //! What tests of the programs share: building and finding them, work folders, running on ranks with a time limit, and
 //! comparing results.
 
+pub mod damage;
 pub mod python;
 pub mod shim;
 pub mod trial;

@@ -1,7 +1,9 @@
 //! What tests that stop, kill or damage a run share: a scene with its uninterrupted answer, folders to compute it in
 //! again, and means to do something to a run under way.
 
+use crate::shim::{self, Fault};
 use crate::{Output, TIME_LIMIT, WorkFolder, assert_same_bits, command, computed, run, run_within};
+use formats::checkpoint;
 use formats::folder::RunFolder;
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -112,7 +114,17 @@ impl Trial {
     /// Computes the scene once, on one rank.
     #[track_caller]
     pub fn new(scene: &str) -> Self {
-        let work = WorkFolder::new();
+        Self::within(WorkFolder::new(), scene)
+    }
+
+    /// The same, with its folders in memory.
+    #[track_caller]
+    pub fn in_memory(scene: &str) -> Self {
+        Self::within(WorkFolder::in_memory(), scene)
+    }
+
+    #[track_caller]
+    fn within(work: WorkFolder, scene: &str) -> Self {
         let reference = computed(&work, "one", scene, 1);
         let steps = steps(&reference);
         assert!((120..2000).contains(&steps), "{steps} steps are not a test");
@@ -155,10 +167,59 @@ pub fn launch(folder: &RunFolder, ranks: usize, extra: &[&str]) -> Output {
     run("sph-run", &arguments, ranks)
 }
 
+/// Time a launch of a short scene may take under a fault before it counts as hanging: a second or two on a machine
+/// that has nothing else to do.
+pub const HANGS: Duration = Duration::from_secs(60);
+
+/// Starts `sph-run` in a folder with a fault, which must strike, and may not hang. Returns also what struck.
+#[track_caller]
+pub fn strike(folder: &RunFolder, ranks: usize, extra: &[&str], fault: &Fault) -> (Output, Vec<String>) {
+    let log = folder.path().with_extension("struck");
+    let _ = fs::remove_file(&log);
+    let mut arguments = vec![folder.path().as_os_str()];
+    arguments.extend(extra.iter().map(OsStr::new));
+    let mut command = command("sph-run", &arguments, ranks);
+    fault.put(&mut command, &shim::library(), folder.path(), &log).expect("the folder is there");
+    let output = run_within(HANGS, &mut command);
+    let struck = shim::struck(&log);
+    assert!(!output.timed_out, "it hangs under {fault:?}: {struck:?}\n{output}");
+    assert!(!struck.is_empty(), "there was no such call: {fault:?}\n{output}");
+    (output, struck)
+}
+
+/// The calls a launch makes, of all ranks, in the order they began. `kinds` as in [`Fault`].
+#[track_caller]
+pub fn calls(folder: &RunFolder, ranks: usize, extra: &[&str], kinds: &str, code: i32) -> Vec<shim::Call> {
+    let log = folder.path().with_extension("calls");
+    let mut arguments = vec![folder.path().as_os_str()];
+    arguments.extend(extra.iter().map(OsStr::new));
+    let mut command = command("sph-run", &arguments, ranks);
+    Fault::count().of(kinds, "*").put(&mut command, &shim::library(), folder.path(), &log).expect("the folder");
+    run_within(HANGS, &mut command).expect(code);
+    shim::calls(&log)
+}
+
+/// Number and step of the newest generation, which must be sound; 0, 0 where there is none.
+#[track_caller]
+pub fn newest(folder: &RunFolder) -> (u64, u64) {
+    let found = checkpoint::latest(folder).unwrap_or_else(|error| panic!("{error}"));
+    let Some(found) = found else { return (0, 0) };
+    assert!(found.warnings.is_empty(), "a newer generation is damaged: {:?}", found.warnings);
+    (found.manifest.generation, found.manifest.step)
+}
+
 /// Steps of a run, from the last line of its history.
 pub fn steps(folder: &RunFolder) -> u64 {
     let history = fs::read_to_string(folder.history()).unwrap();
     history.lines().last().and_then(|line| line.split(',').nth(1)?.parse().ok()).expect("a second column")
+}
+
+/// A copy of a run folder, beside it.
+pub fn copy(folder: &RunFolder, name: &str) -> RunFolder {
+    let copied = RunFolder::new(folder.path().with_file_name(name));
+    let status = process::Command::new("cp").arg("-r").arg(folder.path()).arg(copied.path()).status();
+    assert!(status.expect("cp starts").success());
+    copied
 }
 
 /// SHA-256 of a file's bytes.
@@ -189,14 +250,20 @@ pub fn state(folder: &Path) -> BTreeMap<PathBuf, (u64, SystemTime)> {
 
 /// Starts a run with a checkpoint every 20 steps and, once there are two, does something to it.
 pub fn while_running(folder: &RunFolder, ranks: usize, act: impl FnOnce(&RunFolder) + Send) -> Output {
+    let arguments = [folder.path().as_os_str(), "--checkpoint-every".as_ref(), "20steps".as_ref()];
+    let manifest = folder.generation(2).join("MANIFEST.json");
+    meanwhile(command("sph-run", &arguments, ranks), || manifest.exists(), || act(folder))
+}
+
+/// Runs a command and, once something is so, does something. Fails the test where it is not so within a minute.
+#[track_caller]
+pub fn meanwhile(mut command: process::Command, so: impl Fn() -> bool + Send, act: impl FnOnce() + Send) -> Output {
     thread::scope(|scope| {
         scope.spawn(|| {
-            let manifest = folder.generation(2).join("MANIFEST.json");
-            assert!(appears(Duration::from_secs(60), || manifest.exists()), "no checkpoint within a minute");
-            act(folder);
+            assert!(appears(Duration::from_secs(60), so), "not within a minute");
+            act();
         });
-        let arguments = [folder.path().as_os_str(), "--checkpoint-every".as_ref(), "20steps".as_ref()];
-        run_within(TIME_LIMIT, &mut command("sph-run", &arguments, ranks))
+        run_within(TIME_LIMIT, &mut command)
     })
 }
 
