@@ -2,3 +2,6 @@
 
 mod faults;
 mod generations;
+mod limits;
+mod outputs;
+mod scene;

@@ -71,7 +71,8 @@ impl Programs {
         Ok(Self { shell: launch::shell()?, folder: self.folder.clone() })
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    /// Path of one of them.
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 }
