@@ -116,7 +116,7 @@ pub struct Generation<'a> {
     pub job: Option<&'a str>,
     /// (0)
     pub keep: Keep,
-    /// (0) Asked right before the generation gets its name: does this process still own the folder?
+    /// (0) Does this process still own the folder? Asked before anything is removed and before the generation gets its name.
     pub still_ours: &'a dyn Fn() -> Result<(), FileError>,
 }
 
@@ -128,13 +128,13 @@ pub struct Generation<'a> {
 pub fn commit(new: &Generation, comm: &Communicator) -> Result<u64, FileError> {
     let begun = Instant::now();
     let folder = new.folder;
-    let generation = h5::from_root(comm, || begin(folder))?;
+    let generation = h5::from_root(comm, || (new.still_ours)().and_then(|()| begin(folder)))?;
     let unfinished = unfinished(folder, generation);
     let outcome = write_verified(&unfinished.join(STATE), new, comm).and_then(|(digests, checksum)| {
         let ranks = comm.size() as u64;
         h5::from_root(comm, || seal(new, generation, ranks, begun, digests, checksum))
     });
-    if outcome.is_err() && comm.rank() == 0 {
+    if outcome.is_err() && comm.rank() == 0 && (new.still_ours)().is_ok() {
         let _ = fs::remove_dir_all(&unfinished);
     }
     outcome?;
@@ -171,6 +171,33 @@ pub fn latest(folder: &RunFolder) -> Result<Option<Found>, FileError> {
     let all: Vec<_> = warnings.iter().map(ToString::to_string).collect();
     let what = format!("none of its {} generations is sound ({})", all.len(), all.join("; "));
     Err(FileError::damaged(&folder.checkpoints(), what))
+}
+
+/// The sound generation of a step; if several, the newest. Those after it are set aside, under names that no launch looks
+/// at. Serial.
+///
+/// # Errors
+/// `CannotRead` where there is none of that step, with the steps there are; as [`verify`]; `CannotWrite`.
+pub fn go_back(folder: &RunFolder, step: u64) -> Result<Found, FileError> {
+    let generations = generations(folder)?;
+    let manifest =
+        |&generation: &u64| Some((generation, read_manifest(&folder.generation(generation), generation).ok()?));
+    let manifests: Vec<_> = generations.iter().filter_map(manifest).collect();
+    let Some((generation, _)) = manifests.iter().rev().find(|(_, manifest)| manifest.step == step) else {
+        let steps: Vec<_> = manifests.iter().map(|(_, manifest)| manifest.step.to_string()).collect();
+        let what = format!("no checkpoint of step {step}; there are those of {}", steps.join(", "));
+        return Err(FileError::CannotRead { path: folder.checkpoints().display().to_string(), what });
+    };
+    let manifest = verify(folder, *generation)?;
+    // The newest first: wherever this is cut off, the newest that is left is a state the run was in.
+    for later in generations.into_iter().filter(|later| later > generation).rev() {
+        let place = folder.generation(later);
+        let aside = (1..).map(|n| folder.checkpoints().join(format!("aside-{later:06}-{n}"))).find(|p| !p.exists());
+        let moved = aside.map_or(Ok(()), |aside| fs::rename(&place, aside));
+        moved.map_err(|error| FileError::writing(&place, 0, &error))?;
+    }
+    disk::sync_folder(&folder.checkpoints())?;
+    Ok(Found { state: folder.generation(*generation).join(STATE), manifest, warnings: Vec::new() })
 }
 
 /// The newest generation whose manifest is sound, without a look at its state. Serial.

@@ -2,6 +2,7 @@
 
 mod faults;
 mod generations;
+mod golden;
 mod limits;
 mod outputs;
 mod scene;
