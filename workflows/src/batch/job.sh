@@ -1,0 +1,134 @@
+#!/bin/sh
+# Job script of one run, written by `./talus batch`; edit it as you like, and submit it as often as you like:
+# it goes on where the run is, and does nothing once all is done. Outside Slurm it runs with `sh` alone.
+@SBATCH@
+@SETUP@
+set -u
+run=@RUN@
+programs=@PROGRAMS@
+ranks=${SLURM_NTASKS:-@RANKS@}
+go_on=@GO_ON@ # requeue: this job goes back into the queue; chain: the next job of the chain goes on
+
+# After TERM mpirun kills its ranks; it must leave them the time for a checkpoint.
+export OMPI_MCA_odls_base_sigkill_timeout=@PATIENCE@
+
+parallel() { exec @LAUNCHER@ -n "$ranks" "$@"; }
+
+say() { echo "$(date -u +%Y-%m-%dT%H:%M:%SZ) job.sh: $*" >&2; }
+
+# USR1 comes before the time limit and at a preemption, TERM before a kill. Both go on to mpirun as USR1, which it hands
+# to every rank, and the ranks stop after a checkpoint.
+child='' stopping='' woken=''
+stop() {
+    say "told to stop ($1)"
+    stopping=$1 woken=yes
+    [ -z "$child" ] || kill -s USR1 "$child" 2>/dev/null
+}
+trap 'stop USR1' USR1
+trap 'stop TERM' TERM
+trap 'stop INT' INT
+
+# run_to_end WORD...: the status of the program is left in $status. A signal ends `wait`, not the program: so it waits
+# until no signal came in between; the status of a program that is collected already (127) is known then.
+run_to_end() {
+    status=75
+    [ -z "$stopping" ] || return 0
+    status=127
+    "$@" &
+    child=$!
+    woken=yes
+    while [ -n "$woken" ]; do
+        woken=''
+        code=0
+        wait "$child" || code=$?
+        [ "$code" = 127 ] || status=$code
+    done
+    child=''
+}
+
+# Cancels the jobs that wait with this same script: they would fail as well, or nobody wants them now.
+cancel_the_rest() {
+    [ "$go_on" = chain ] && [ -n "${SLURM_JOB_ID:-}" ] || return 0
+    script=$(squeue --noheader --jobs="$SLURM_JOB_ID" --format=%o)
+    squeue --noheader --user="$(id -un)" --states=PENDING --format='%A %o' | while read -r job command; do
+        [ "$command" != "$script" ] || { say "job $job is cancelled" && scancel "$job"; }
+    done
+}
+
+# give_up CODE WORD...: no job goes on.
+give_up() {
+    code=$1
+    shift
+    say "$*"
+    cancel_the_rest
+    exit "$code"
+}
+
+# What CONTINUE says of a key; nothing where there is no such file.
+told() { sed -n "s/.*\"$1\": *\"\{0,1\}\([^\",}]*\).*/\1/p" CONTINUE 2>/dev/null; }
+
+# Ends this slice in such a way that another one follows.
+next_slice() {
+    case $(told reason) in
+    stop-file | steps)
+        # A person's wish. Code 75 would put the job back where Slurm is set up so.
+        give_up 0 "stopped on request; submit this script again to go on"
+        ;;
+    esac
+    if [ "$(told step)" = "$before" ]; then
+        stands=$(($(cat log/standstill 2>/dev/null || echo 0) + 1))
+        echo "$stands" >log/standstill
+        [ "$stands" -lt 3 ] || give_up 70 "three slices in a row brought nothing: too short?"
+    else
+        rm -f log/standstill
+    fi
+    if [ "$go_on" = requeue ] && [ -n "${SLURM_JOB_ID:-}" ]; then
+        # Slurm puts a job with one of the codes RequeueExit back by itself.
+        case ",$(scontrol show config | sed -n 's/^RequeueExit *= *//p')," in
+        *,75,*) ;;
+        *) scontrol requeue "$SLURM_JOB_ID" || say "cannot put the job back; submit this script again to go on" ;;
+        esac
+    fi
+    say "stopped at t = $(told time) s with a checkpoint; goes on in the next slice"
+    exit 75
+}
+
+# may_go_on WHAT: after a failure with $status, returns where another slice may follow.
+may_go_on() {
+    case $status in
+    2 | 65 | 70 | 73 | 76 | 126 | 127) give_up "$status" "$1 failed with exit code $status" ;;
+    75) return 0 ;;
+    esac
+    # mpirun says 1 after TERM whatever the ranks say, and a signal that comes too early kills them.
+    [ -f CONTINUE ] || [ -n "$stopping" ] || give_up "$status" "$1 failed with exit code $status"
+}
+
+cd "$run" || exit 73
+mkdir -p log || exit 73
+before=$(told step)
+
+if [ ! -f scene.lock.toml ]; then
+    if [ ! -f prepared/scene.lock.toml ]; then
+        run_to_end parallel "$programs/sph-prep" scene.toml -o prepared
+        [ "$status" = 0 ] || { may_go_on sph-prep && next_slice; }
+    fi
+    # The scene last: once it is there, so is all it needs.
+    for file in initial.hdf provenance.json scene.lock.toml; do
+        [ ! -f "prepared/$file" ] || mv -f "prepared/$file" . || exit 73
+    done
+    rm -rf prepared prepared.tmp-*
+fi
+
+if [ ! -f DONE ]; then
+    rm -f CONTINUE log/evaluated
+    run_to_end parallel "$programs/sph-run" "$run"@OPTIONS@
+    [ "$status" = 0 ] || { may_go_on sph-run && next_slice; }
+    [ -f DONE ] || give_up 70 "sph-run ended without DONE"
+fi
+
+if [ ! -f log/evaluated ]; then
+    run_to_end "$programs/sph-post" "$run"
+    [ "$status" = 0 ] || { may_go_on sph-post && next_slice; }
+    : >log/evaluated
+fi
+say "done: $run"

@@ -1,0 +1,133 @@
+//! The text of the job script: `job.sh` with what belongs to one run filled in, every word quoted.
+
+use crate::failure::Failure;
+use std::path::{Path, PathBuf};
+
+/// How a run goes on after a slice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GoOn {
+    /// The job is put back into the queue.
+    Requeue,
+    /// The next job of a chain takes over.
+    Chain,
+}
+
+/// What a job script says.
+#[derive(Clone, Debug)]
+pub struct Script {
+    /// Name of the job.
+    pub name: String,
+    /// Run folder, absolute.
+    pub run: PathBuf,
+    /// Folder of the three programs, absolute.
+    pub programs: PathBuf,
+    /// What starts parallel programs: `mpirun`, or the words of TALUS_MPIRUN.
+    pub launcher: Vec<String>,
+    /// MPI ranks.
+    pub ranks: u32,
+    /// How it goes on.
+    pub go_on: GoOn,
+    /// Words for `sbatch`, one a line: `--time=04:00:00`.
+    pub sbatch: Vec<String>,
+    /// Seconds that Slurm sends USR1 before the limit, and that ranks have for a checkpoint after TERM.
+    pub warning: u32,
+    /// Lines that come first: modules.
+    pub setup: String,
+    /// More options of `sph-run`.
+    pub options: Vec<String>,
+}
+
+const TEMPLATE: &str = include_str!("job.sh");
+
+impl Script {
+    /// The text.
+    ///
+    /// # Errors
+    /// Usage, where a word holds a line break, which no `#SBATCH` line can.
+    pub fn text(&self) -> Result<String, Failure> {
+        let launcher: Vec<String> = self.launcher.iter().map(|word| shell_word(word)).collect();
+        let options: String = self.options.iter().map(|word| format!(" {}", shell_word(word))).collect();
+        let go_on = match self.go_on {
+            GoOn::Requeue => "requeue",
+            GoOn::Chain => "chain",
+        };
+        let setup = match self.setup.trim_end() {
+            "" => String::new(),
+            lines => format!("{lines}\n"),
+        };
+        let filled = [
+            ("@SBATCH@", self.sbatch_lines()?),
+            ("@SETUP@\n", setup),
+            ("@RUN@", path_word(&self.run)?),
+            ("@PROGRAMS@", path_word(&self.programs)?),
+            ("@RANKS@", self.ranks.to_string()),
+            ("@GO_ON@", go_on.to_owned()),
+            ("@PATIENCE@", self.warning.max(10).to_string()),
+            ("@LAUNCHER@", launcher.join(" ")),
+            ("@OPTIONS@", options),
+        ];
+        // Piece by piece, so that what is filled in is never taken for a mark.
+        let (mut text, mut rest) = (String::new(), TEMPLATE);
+        for (mark, value) in filled {
+            let Some((before, after)) = rest.split_once(mark) else { continue };
+            text += before;
+            text += &value;
+            rest = after;
+        }
+        text += rest;
+        Ok(text)
+    }
+
+    fn sbatch_lines(&self) -> Result<String, Failure> {
+        let requeue = match self.go_on {
+            GoOn::Requeue => "--requeue",
+            GoOn::Chain => "--no-requeue",
+        };
+        let mut words = vec![
+            format!("--job-name={}", self.name),
+            format!("--chdir={}", self.run.display()),
+            "--output=log/job-%j.txt".to_owned(),
+            "--open-mode=append".to_owned(),
+            requeue.to_owned(),
+            format!("--ntasks={}", self.ranks),
+        ];
+        if self.warning > 0 {
+            words.push(format!("--signal=B:USR1@{}", self.warning));
+        }
+        words.extend(self.sbatch.iter().cloned());
+        let lines: Result<Vec<_>, _> = words.iter().map(|word| Ok(format!("#SBATCH {}", sbatch_word(word)?))).collect();
+        Ok(lines?.join("\n"))
+    }
+}
+
+/// A path as a word for the shell.
+fn path_word(path: &Path) -> Result<String, Failure> {
+    let text = path.to_str().filter(|text| !text.contains('\n'));
+    text.map(shell_word).ok_or_else(|| Failure::usage(format!("{path:?}: a job script needs a path of plain text")))
+}
+
+/// A word that a POSIX shell reads back as it is.
+pub fn shell_word(word: &str) -> String {
+    match plain(word) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
+/// A word as `sbatch` reads it from an `#SBATCH` line: within double quotes a backslash protects those and itself.
+fn sbatch_word(word: &str) -> Result<String, Failure> {
+    if word.contains('\n') {
+        return Err(Failure::usage(format!("{word:?}: a word for sbatch cannot hold a line break")));
+    }
+    let quoted = |text: &str| format!("\"{}\"", text.replace('\\', r"\\").replace('"', "\\\""));
+    Ok(match word.split_once('=') {
+        _ if plain(word) => word.to_owned(),
+        Some((option, value)) if plain(option) => format!("{option}={}", quoted(value)),
+        _ => quoted(word),
+    })
+}
+
+/// Only letters that mean nothing to a shell or to sbatch.
+fn plain(word: &str) -> bool {
+    !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || "_-./:=,+@%".contains(c))
+}
