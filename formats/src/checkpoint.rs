@@ -10,18 +10,23 @@
 use crate::disk;
 use crate::folder::RunFolder;
 use crate::h5::{self, Communicator};
-use crate::provenance::{Build, sha256, sha256_file};
+use crate::outputs::Segment;
+use crate::provenance::{Build, sha256};
 use crate::schema::Kept;
-use crate::snapshot::{self, FileError, Header, Rows};
-use mpi::traits::Communicator as _;
+use crate::snapshot::{self, Digests, FileError, Header, Rows};
+use mpi::collective::SystemOperation;
+use mpi::traits::{Communicator as _, CommunicatorCollectives};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::io;
+use sha2::{Digest, Sha256};
+use std::cmp::Ordering;
+use std::fs::File;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
-use std::{fs, process};
+use std::time::Instant;
+use std::{fs, io, process};
 
 /// Version of the manifest; a newer one is refused.
-pub const FORMAT_VERSION: u64 = 1;
+pub const FORMAT_VERSION: u64 = 2;
 
 /// What belongs to one generation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,25 +35,42 @@ pub struct Manifest {
     pub format_version: u64,
     /// Number of the generation; rises, is never used twice while an older one is kept.
     pub generation: u64,
+    /// The generation that was the newest when this one was written.
+    pub parent: Option<u64>,
     /// Steps done.
     pub step: u64,
     /// Time, s.
     pub time: f64,
-    /// SHA-256 of the scene's text.
+    /// The scene's text: a scene that is changed later is compared with it.
+    pub scene: String,
+    /// As in the header of the state.
     pub scene_hash: String,
-    /// [`snapshot::digest`] of the state: the same on any number of ranks.
-    pub digest: String,
-    /// SHA-256 of the bytes of `state.hdf`: checked before HDF5 is let near the file.
-    pub state_sha256: String,
+    /// Of the numbers of the state, field by field: the same on any number of ranks.
+    pub digests: Digests,
+    /// [`checksum`] of `state.hdf`: checked before HDF5 is let near the file.
+    pub state_checksum: String,
     /// Length of `state.hdf` in bytes.
     pub state_bytes: u64,
     /// The run's own state (next output times, sums over time). Finite floats keep their bits; JSON knows no others.
     pub clock: serde_json::Value,
-    /// Outputs that go on growing: path within the run folder, and the length in bytes that belongs to this
-    /// generation. What lies beyond is dropped on resume.
-    pub outputs: BTreeMap<String, u64>,
+    /// What had been put out by then. What lies beyond is dropped on resume.
+    pub outputs: Outputs,
+    /// What writing this generation took, s.
+    pub write_seconds: f64,
+    /// The scheduler's job that wrote it.
+    pub job: Option<String>,
+    /// On so many ranks.
+    pub ranks: u64,
     /// What wrote it.
     pub build: Build,
+}
+
+/// The outputs that belong to a generation.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Outputs {
+    pub segments: Vec<Segment>,
+    /// Lines of the history since the last segment.
+    pub pending: String,
 }
 
 /// The manifest with its own checksum, as it is on disk.
@@ -59,7 +81,7 @@ struct Sealed {
 }
 
 /// The generation to go on from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// Its manifest.
     pub manifest: Manifest,
@@ -69,27 +91,49 @@ pub struct Found {
     pub warnings: Vec<FileError>,
 }
 
-/// Collective: writes, reads back and publishes a new generation, then removes older ones, keeping `keep` (at least
-/// one) sound ones. `rows` are as in [`snapshot::write`], with all fields. `outputs` are put on the disk (fsync)
-/// before the generation is published. `clock` and `outputs` count on rank 0 only. Returns the generation's number.
+/// Which generations are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Keep {
+    /// So many sound ones, at least one.
+    pub newest: usize,
+    /// And for ever those whose number is a multiple of this.
+    pub archive: Option<u64>,
+}
+
+/// A generation to write. What is marked (0) counts on rank 0 only.
+pub struct Generation<'a> {
+    pub folder: &'a RunFolder,
+    pub header: &'a Header,
+    /// As in [`snapshot::write`], with all fields.
+    pub rows: &'a Rows,
+    /// (0) See [`Manifest`], as all that follows.
+    pub clock: &'a serde_json::Value,
+    /// (0) On the disk already.
+    pub outputs: Option<&'a Outputs>,
+    /// (0)
+    pub scene: &'a str,
+    /// (0)
+    pub job: Option<&'a str>,
+    /// (0)
+    pub keep: Keep,
+    /// (0) Asked right before the generation gets its name: does this process still own the folder?
+    pub still_ours: &'a dyn Fn() -> Result<(), FileError>,
+}
+
+/// Collective: writes, reads back and publishes a new generation, then removes older ones. Returns its number.
 ///
 /// # Errors
 /// The same on all ranks: `CannotWrite`, `DiskFull`; `Damaged` if what was read back is not what was written. The
 /// generations that were there before are then untouched.
-pub fn commit(
-    folder: &RunFolder,
-    header: &Header,
-    rows: &Rows,
-    clock: &serde_json::Value,
-    outputs: &BTreeMap<String, u64>,
-    keep: usize,
-    comm: &Communicator,
-) -> Result<u64, FileError> {
+pub fn commit(new: &Generation, comm: &Communicator) -> Result<u64, FileError> {
+    let begun = Instant::now();
+    let folder = new.folder;
     let generation = h5::from_root(comm, || begin(folder))?;
     let unfinished = unfinished(folder, generation);
-    let state = unfinished.join(STATE);
-    let outcome = write_verified(&state, header, rows, comm)
-        .and_then(|()| h5::from_root(comm, || seal(folder, generation, header, clock, outputs)));
+    let outcome = write_verified(&unfinished.join(STATE), new, comm).and_then(|(digests, checksum)| {
+        let ranks = comm.size() as u64;
+        h5::from_root(comm, || seal(new, generation, ranks, begun, digests, checksum))
+    });
     if outcome.is_err() && comm.rank() == 0 {
         let _ = fs::remove_dir_all(&unfinished);
     }
@@ -97,7 +141,7 @@ pub fn commit(
     // The new generation is safe; only now may older ones go. That one can't be removed is no reason to stop a run.
     if comm.rank() == 0 {
         let _ = disk::write_atomic(&folder.checkpoints().join("LATEST"), format!("gen-{generation:06}\n").as_bytes());
-        let _ = prune(folder, keep.max(1));
+        let _ = prune(folder, new.keep);
     }
     Ok(generation)
 }
@@ -129,12 +173,13 @@ pub fn latest(folder: &RunFolder) -> Result<Option<Found>, FileError> {
     Err(FileError::damaged(&folder.checkpoints(), what))
 }
 
-/// Collective: [`latest`], looked up by rank 0.
+/// The newest generation whose manifest is sound, without a look at its state. Serial.
 ///
 /// # Errors
-/// As [`latest`], the same on all ranks.
-pub fn latest_on_all(folder: &RunFolder, comm: &Communicator) -> Result<Option<Found>, FileError> {
-    h5::from_root(comm, || latest(folder))
+/// `CannotRead`.
+pub fn newest_manifest(folder: &RunFolder) -> Result<Option<Manifest>, FileError> {
+    let manifest = |generation| read_manifest(&folder.generation(generation), generation).ok();
+    Ok(generations(folder)?.into_iter().rev().find_map(manifest))
 }
 
 /// The numbers of the generations there, sound or not, rising. Serial.
@@ -167,17 +212,57 @@ pub fn verify(folder: &RunFolder, generation: u64) -> Result<Manifest, FileError
     let place = folder.generation(generation);
     let manifest = read_manifest(&place, generation)?;
     let state = place.join(STATE);
-    if sha256_file(&state)? != manifest.state_sha256 {
-        return Err(FileError::damaged(&state, "its bytes do not match the checksum in MANIFEST.json"));
+    if checksum(&state)? != manifest.state_checksum {
+        let mut what = String::from("its bytes do not match the checksum in MANIFEST.json");
+        if let Ok((_, digests)) = snapshot::digests(&state) {
+            let fields = digests.different(&manifest.digests);
+            what += &if fields.is_empty() { String::new() } else { format!(": changed in {}", fields.join(", ")) };
+        }
+        return Err(FileError::damaged(&state, what));
     }
-    let header = snapshot::read_header(&state)?;
+    let (header, digests) = snapshot::digests(&state)?;
     let same = header.step == manifest.step
         && header.time.to_bits() == manifest.time.to_bits()
         && header.scene_hash == manifest.scene_hash;
-    if !same || snapshot::digest(&state)? != manifest.digest {
+    if !same || digests != manifest.digests {
         return Err(FileError::damaged(&state, "it belongs to another MANIFEST.json"));
     }
     Ok(manifest)
+}
+
+/// Bytes of a file that are hashed as one.
+const BLOCK: u64 = 4 << 20;
+
+/// A checksum of a file's bytes that ranks can share the work of: SHA-256 over those of its blocks of 4 MiB. Serial.
+///
+/// # Errors
+/// `NotFound`, `CannotRead`.
+pub fn checksum(path: &Path) -> Result<String, FileError> {
+    Ok(sha256(&block_hashes(path, 0, 1)?))
+}
+
+/// Collective: [`checksum`], of which every rank does its share.
+fn checksum_together(path: &Path, comm: &Communicator) -> Result<String, FileError> {
+    let mine = h5::agree(comm, block_hashes(path, comm.rank() as u64, comm.size() as u64))?;
+    let mut all = vec![0u8; mine.len()];
+    comm.all_reduce_into(&mine[..], &mut all[..], SystemOperation::bitwise_or());
+    Ok(sha256(&all))
+}
+
+/// The hashes of every `size`-th block from number `first` on; zeros stand for the others.
+fn block_hashes(path: &Path, first: u64, size: u64) -> Result<Vec<u8>, FileError> {
+    let reading = |error| FileError::reading(path, &error);
+    let file = File::open(path).map_err(reading)?;
+    let length = file.metadata().map_err(reading)?.len();
+    let blocks = length.div_ceil(BLOCK).max(1);
+    let mut hashes = vec![0u8; 32 * blocks as usize];
+    let mut bytes = Vec::new();
+    for block in (first..blocks).step_by(size as usize) {
+        bytes.resize(BLOCK.min(length - block * BLOCK) as usize, 0);
+        file.read_exact_at(&mut bytes, block * BLOCK).map_err(reading)?;
+        hashes[32 * block as usize..][..32].copy_from_slice(&Sha256::digest(&bytes));
+    }
+    Ok(hashes)
 }
 
 const STATE: &str = "state.hdf";
@@ -204,45 +289,46 @@ fn begin(folder: &RunFolder) -> Result<u64, FileError> {
     Ok(generation)
 }
 
-/// Collective: writes the state, and has every rank read its rows back and compare them with its memory.
-fn write_verified(state: &Path, header: &Header, rows: &Rows, comm: &Communicator) -> Result<(), FileError> {
-    snapshot::write(state, header, rows, Kept::Checkpoint, comm)?;
-    let range = rows.first..rows.first + rows.len() as u64;
-    let (header_read, rows_read) = snapshot::read_rows(state, range, comm)?;
-    let same = header_read == *header && rows_read.same_bits(rows);
-    h5::agree(comm, if same { Ok(()) } else { Err(FileError::damaged(state, "read back, it differs from memory")) })
+/// Collective: writes the state, and has every rank read back what another one wrote. Returns the digests of its
+/// numbers and the checksum of its bytes.
+fn write_verified(state: &Path, new: &Generation, comm: &Communicator) -> Result<(Digests, String), FileError> {
+    let digests = snapshot::write(state, new.header, new.rows, Kept::Checkpoint, comm)?;
+    let (header, read) = snapshot::digests_of_shares(state, new.header.count, comm)?;
+    if header != *new.header || read != digests {
+        let what = format!("read back, it differs from memory: {}", read.different(&digests).join(", "));
+        return Err(FileError::cannot_write(state, what));
+    }
+    Ok((digests, checksum_together(state, comm)?))
 }
 
-/// Rank 0: outputs to the disk, the manifest last, then the name.
+/// Rank 0: the manifest last, then the name.
 fn seal(
-    folder: &RunFolder,
+    new: &Generation,
     generation: u64,
-    header: &Header,
-    clock: &serde_json::Value,
-    outputs: &BTreeMap<String, u64>,
+    ranks: u64,
+    begun: Instant,
+    digests: Digests,
+    state_checksum: String,
 ) -> Result<(), FileError> {
-    for (output, &length) in outputs {
-        let path = folder.path().join(output);
-        disk::sync_file(&path)?;
-        let there = fs::metadata(&path).map_err(|error| FileError::reading(&path, &error))?.len();
-        if there < length {
-            let what = format!("it has {there} bytes, {length} were committed");
-            return Err(FileError::cannot_write(&path, what));
-        }
-    }
+    let (folder, header) = (new.folder, new.header);
     let unfinished = unfinished(folder, generation);
     let state = unfinished.join(STATE);
     let manifest = Manifest {
         format_version: FORMAT_VERSION,
         generation,
+        parent: generations(folder)?.last().copied(),
         step: header.step,
         time: header.time,
+        scene: new.scene.to_owned(),
         scene_hash: header.scene_hash.clone(),
-        digest: snapshot::digest(&state)?,
-        state_sha256: sha256_file(&state)?,
+        digests,
+        state_checksum,
         state_bytes: fs::metadata(&state).map_err(|error| FileError::reading(&state, &error))?.len(),
-        clock: clock.clone(),
-        outputs: outputs.clone(),
+        clock: new.clock.clone(),
+        outputs: new.outputs.cloned().unwrap_or_default(),
+        write_seconds: begun.elapsed().as_secs_f64(),
+        job: new.job.map(str::to_owned),
+        ranks,
         build: Build::this(),
     };
     let path = unfinished.join(MANIFEST);
@@ -256,6 +342,7 @@ fn seal(
     if read_manifest(&unfinished, generation)? != manifest {
         return Err(FileError::cannot_write(&path, "read back, the manifest differs from memory"));
     }
+    (new.still_ours)()?;
     disk::publish(&unfinished, &folder.generation(generation))
 }
 
@@ -271,8 +358,13 @@ fn read_manifest(place: &Path, generation: u64) -> Result<Manifest, FileError> {
     // The version before the rest, whose shape may have changed since.
     let version = sealed.manifest.get("format_version").and_then(serde_json::Value::as_u64);
     let version = version.ok_or_else(|| damaged("it has no format_version"))?;
-    if version > FORMAT_VERSION {
-        return Err(FileError::Newer { path: path.display().to_string(), found: version, known: FORMAT_VERSION });
+    let name = || path.display().to_string();
+    match version.cmp(&FORMAT_VERSION) {
+        Ordering::Greater => {
+            return Err(FileError::Newer { path: name(), found: version, known: FORMAT_VERSION });
+        }
+        Ordering::Less => return Err(FileError::Older { path: name(), found: version, known: FORMAT_VERSION }),
+        Ordering::Equal => {}
     }
     let manifest: Manifest = serde_json::from_value(sealed.manifest).map_err(|error| damaged(&error.to_string()))?;
     if manifest.generation != generation {
@@ -287,13 +379,17 @@ fn read_manifest(place: &Path, generation: u64) -> Result<Manifest, FileError> {
     Ok(manifest)
 }
 
-/// Removes older generations, keeping the `keep` newest with a sound manifest and a state of the right length.
-fn prune(folder: &RunFolder, keep: usize) -> Result<(), FileError> {
+/// Removes older generations, keeping the newest with a sound manifest and a state of the right length, and those of
+/// the archive.
+fn prune(folder: &RunFolder, keep: Keep) -> Result<(), FileError> {
     let mut kept = 0;
     for generation in generations(folder)?.into_iter().rev() {
         let place = folder.generation(generation);
-        if kept < keep {
+        if kept < keep.newest.max(1) {
             kept += usize::from(read_manifest(&place, generation).is_ok());
+            continue;
+        }
+        if keep.archive.is_some_and(|every| generation.is_multiple_of(every)) {
             continue;
         }
         // Renamed first: a generation that is half removed must not be taken for a damaged one.

@@ -27,7 +27,7 @@ impl RunFolder {
     pub fn initial(&self) -> PathBuf {
         self.0.join("initial.hdf")
     }
-    /// Snapshots and history.
+    /// Snapshots and history: see [`crate::outputs`].
     pub fn out(&self) -> PathBuf {
         self.0.join("out")
     }
@@ -43,9 +43,29 @@ impl RunFolder {
     pub fn history(&self) -> PathBuf {
         self.out().join("history.csv")
     }
+    /// The lines of history of segment number `segment`.
+    pub fn history_piece(&self, segment: u64) -> PathBuf {
+        self.history_pieces().join(format!("{segment:06}.csv"))
+    }
+    /// The folder of the pieces of history.
+    pub fn history_pieces(&self) -> PathBuf {
+        self.out().join("history")
+    }
+    /// What of `out/` counts: see [`crate::outputs`].
+    pub fn index(&self) -> PathBuf {
+        self.out().join("index.json")
+    }
     /// Logs that depend on the machine: rates, imbalance.
     pub fn log(&self) -> PathBuf {
         self.0.join("log")
+    }
+    /// What happened to the run: see [`crate::journal`].
+    pub fn events(&self) -> PathBuf {
+        self.log().join("events.jsonl")
+    }
+    /// How far the run is: see [`crate::journal`].
+    pub fn progress(&self) -> PathBuf {
+        self.log().join("progress.json")
     }
     /// Checkpoint generations.
     pub fn checkpoints(&self) -> PathBuf {
@@ -62,6 +82,10 @@ impl RunFolder {
     /// Present once the run reached its end.
     pub fn done(&self) -> PathBuf {
         self.0.join("DONE")
+    }
+    /// Present while the run waits to be gone on with: it stopped early, with a checkpoint.
+    pub fn to_continue(&self) -> PathBuf {
+        self.0.join("CONTINUE")
     }
     /// A user's request to stop at the next step.
     pub fn stop(&self) -> PathBuf {

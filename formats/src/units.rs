@@ -133,20 +133,42 @@ pub fn parse(text: &str, dimension: Dimension) -> Result<f64, String> {
         return Err(format!("`{text}` does not begin with a finite number; {}", dimension.needed()));
     }
     let unit = normalised(unit);
-    let (shift, multiply, divide) = match (dimension, unit.as_str()) {
-        (Dimension::Number, "") => (0, 1.0, 1.0),
+    let unit = match (dimension, unit.as_str()) {
+        (Dimension::Number, "") => &NO_UNIT,
         (_, "") => return Err(format!("`{text}` has no unit; {}", dimension.needed())),
         _ => {
-            let found =
-                UNITS.iter().find(|u| u.name.replace(' ', "") == unit).ok_or_else(|| unknown(&unit, dimension))?;
+            let found = named(&unit).ok_or_else(|| unknown(&unit, dimension))?;
             if found.dimension != dimension {
                 return Err(format!("`{text}` is {}; {}", found.dimension.name(), dimension.needed()));
             }
-            (found.shift, found.multiply, found.divide)
+            found
         }
     };
-    let value = shifted(number, shift).map(|value| value * multiply / divide);
-    value.filter(|v| v.is_finite()).ok_or_else(|| format!("`{text}` is not a finite number; {}", dimension.needed()))
+    unit.value(number).ok_or_else(|| format!("`{text}` is not a finite number; {}", dimension.needed()))
+}
+
+/// The number that [`parse`] makes of a text, whatever it measures; none where it is no quantity. Every unit stands for one
+/// dimension only.
+pub(crate) fn any(text: &str) -> Option<f64> {
+    let (number, unit) = split(text.trim());
+    let unit = normalised(unit);
+    let unit = if unit.is_empty() { &NO_UNIT } else { named(&unit)? };
+    unit.value(number)
+}
+
+const NO_UNIT: Unit = decimal("", Dimension::Number, 0);
+
+/// The unit of a normalised name.
+fn named(name: &str) -> Option<&'static Unit> {
+    UNITS.iter().find(|unit| unit.name.replace(' ', "") == name)
+}
+
+impl Unit {
+    /// That many of it, in SI units; none where that is no finite number.
+    fn value(&self, number: &str) -> Option<f64> {
+        let value = shifted(number, self.shift)? * self.multiply / self.divide;
+        value.is_finite().then_some(value)
+    }
 }
 
 fn unknown(unit: &str, dimension: Dimension) -> String {
@@ -203,6 +225,19 @@ fn normalised(unit: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Dimension::*, *};
+
+    #[test]
+    fn a_quantity_says_what_it_measures() {
+        let names: std::collections::BTreeSet<_> = UNITS.iter().map(|unit| normalised(unit.name)).collect();
+        assert_eq!(names.len(), UNITS.len(), "each name stands for one unit");
+        for (text, value) in [("2 mm", Some(0.002)), ("1 h", Some(3600.0)), (" 30° ", Some(30.0)), ("0.3", Some(0.3))]
+        {
+            assert_eq!(any(text), value, "{text}");
+        }
+        for text in ["3d", "cubic-spline", "", "mm", "-", "1e999 m", "nan"] {
+            assert_eq!(any(text), None, "{text}");
+        }
+    }
 
     #[test]
     fn prefixes_are_exact() {

@@ -75,7 +75,7 @@ pub struct Analysis {
     pub scene: Scene,
     /// Its text.
     pub text: String,
-    /// The SHA-256 of its text.
+    /// Its hash ([`Scene::hash`]).
     pub hash: String,
     /// What of it matters here.
     pub geometry: Geometry,
@@ -119,7 +119,8 @@ impl Analysis {
         };
         let scene = Scene::read(&path.display().to_string(), &text)?;
         let hash = Scene::hash(&text);
-        let files = files(folder, &hash)?;
+        let index = Index::read(folder)?.unwrap_or_default();
+        let files = files(folder, &index, &hash)?;
         let geometry = Geometry::new(&scene);
         let level = choices.basal_height.height(&geometry);
         let static_speed = choices.static_speed.value(&geometry);
@@ -135,7 +136,7 @@ impl Analysis {
             let wanted = Wanted { level, static_speed, layers: layers.as_ref(), inside, drawn };
             moments.push(moment(&geometry, file, &wanted)?);
         }
-        let history = History::read(&folder.history())?;
+        let history = History::read(folder, &index)?;
         let partition = history.as_ref().and_then(Partition::of);
         Ok(Self {
             scene,
@@ -223,24 +224,11 @@ fn start(folder: &RunFolder, files: &[(f64, PathBuf)]) -> Result<Option<Vec<[f64
     Ok(Some(snapshot::read(path)?.1.position))
 }
 
-/// Times and files to evaluate, ascending in time; at least one. All belong to the scene of this hash.
-fn files(folder: &RunFolder, hash: &str) -> Result<Vec<(f64, PathBuf)>, Failure> {
-    let mut numbered: Vec<(u64, PathBuf)> = Vec::new();
-    let out = folder.out();
-    match std::fs::read_dir(&out) {
-        Ok(entries) => {
-            for entry in entries {
-                let entry = entry.map_err(|error| FileError::reading(&out, &error))?;
-                if let Some(number) = entry.file_name().to_str().and_then(number) {
-                    numbered.push((number, entry.path()));
-                }
-            }
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(error) => return Err(FileError::reading(&out, &error).into()),
-    }
-    numbered.sort();
-    let mut files: Vec<PathBuf> = numbered.into_iter().map(|(_, path)| path).collect();
+/// Times and files to evaluate, ascending in time; at least one. All belong to the scene of this hash. Snapshots that
+/// were moved away are left out.
+fn files(folder: &RunFolder, index: &Index, hash: &str) -> Result<Vec<(f64, PathBuf)>, Failure> {
+    let snapshots = index.snapshots().map(|(number, _)| folder.snapshot(number));
+    let mut files: Vec<PathBuf> = snapshots.filter(|path| path.exists()).collect();
     let begins_late = match files.first() {
         None => true,
         Some(first) => snapshot::read_header(first)?.time > 0.0 && folder.initial().exists(),
@@ -269,12 +257,6 @@ fn files(folder: &RunFolder, hash: &str) -> Result<Vec<(f64, PathBuf)>, Failure>
         timed.push((header.time, path));
     }
     Ok(timed)
-}
-
-/// The number in `snapshot-000012.hdf`.
-fn number(name: &str) -> Option<u64> {
-    let digits = name.strip_prefix("snapshot-")?.strip_suffix(".hdf")?;
-    (digits.len() >= 6 && digits.bytes().all(|b| b.is_ascii_digit())).then(|| digits.parse().ok())?
 }
 
 /// Up to `wanted` of `0..count`, evenly spread, with the first and the last.

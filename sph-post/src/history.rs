@@ -1,5 +1,7 @@
 //! The history a run writes: one line per moment, `name [unit]` above every column.
 
+use formats::folder::RunFolder;
+use formats::outputs::Index;
 use formats::snapshot::FileError;
 use std::path::Path;
 
@@ -22,19 +24,12 @@ pub struct History {
 }
 
 impl History {
-    /// Reads `out/history.csv`. `None` if it is not there or has no line yet. A last line without its end is left out:
-    /// a run may be writing it.
+    /// The history of the segments in the index. `None` where there is no line yet.
     ///
     /// # Errors
-    /// `CannotRead`; `WrongKind` without a proper first line; `Damaged`, with the line, for all else.
-    pub fn read(path: &Path) -> Result<Option<Self>, FileError> {
-        let text = match std::fs::read_to_string(path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(FileError::reading(path, &error)),
-        };
-        let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-        Self::parse(path, whole)
+    /// `NotFound`, `CannotRead`; `WrongKind` without a proper first line; `Damaged`, with the line, for all else.
+    pub fn read(folder: &RunFolder, index: &Index) -> Result<Option<Self>, FileError> {
+        Self::parse(&folder.history(), &index.history(folder)?)
     }
 
     fn parse(path: &Path, text: &str) -> Result<Option<Self>, FileError> {

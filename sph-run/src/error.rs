@@ -32,6 +32,8 @@ pub enum RunError {
     CannotWrite { path: PathBuf, message: String },
     #[error("{}: the run has begun\nhelp: leave --new out to resume it, or choose another folder", .path.display())]
     HasBegun { path: PathBuf },
+    #[error("{0}, or --wall-limit none")]
+    LimitTooShort(String),
     /// On a rank that learnt of rank 0's failure; rank 0 tells the user.
     #[error("rank 0 failed")]
     Elsewhere { code: i32 },
@@ -44,7 +46,7 @@ impl RunError {
     pub fn exit_code(&self) -> i32 {
         match self {
             Self::File(e) => e.exit_code(),
-            Self::Scene(_) | Self::HasBegun { .. } => exit::USAGE,
+            Self::Scene(_) | Self::HasBegun { .. } | Self::LimitTooShort(_) => exit::USAGE,
             Self::Numerical { .. } => exit::NUMERICAL,
             Self::Input { .. } => exit::NO_INPUT,
             Self::CannotWrite { .. } => exit::CANNOT_WRITE,

@@ -5,7 +5,9 @@
 
 pub mod algebra;
 pub mod boundary;
+pub mod check;
 pub mod cli;
+pub mod deadline;
 pub mod dispatch;
 pub mod error;
 pub mod exact;
@@ -13,6 +15,7 @@ pub mod limits;
 pub mod material;
 pub mod neighbors;
 pub mod output;
+pub mod pace;
 pub mod parallel;
 pub mod particles;
 pub mod physics;
@@ -21,6 +24,7 @@ pub mod rates;
 pub mod report;
 pub mod resume;
 pub mod run;
+pub mod scheduler;
 pub mod simulation;
 pub mod space;
 pub mod stabilize;

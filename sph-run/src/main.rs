@@ -4,26 +4,36 @@ use clap::Parser;
 use formats::exit;
 use formats::folder::RunFolder;
 use formats::h5::Communicator;
+use formats::lock::RunLock;
 use formats::scene::Scene;
 use mpi::traits::Communicator as _;
 use sph_run::cli::Cli;
-use sph_run::dispatch;
+use sph_run::deadline::Deadline;
+use sph_run::{check, dispatch};
 use sph_run::error::RunError;
 use sph_run::limits::Limits;
 use sph_run::parallel::agree::{agree, share_text};
-use sph_run::resume::Start;
+use sph_run::resume::{Past, Start, read_scene};
 use sph_run::run::{Outcome, Run};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
 fn main() {
+    let begun = Instant::now();
     let signalled = Limits::watch_signals();
+    let cli = Cli::try_parse();
+    if let Ok(Cli { check: true, run, .. }) = &cli {
+        std::process::exit(check::report(&RunFolder::new(run)));
+    }
     let Some(universe) = mpi::initialize() else {
         eprintln!("sph-run: MPI can't be initialised");
         std::process::exit(exit::USAGE);
     };
     let comm = universe.world();
     abort_all_ranks_on_panic();
-    let code = match Cli::try_parse() {
-        Ok(cli) => launch(&comm, &cli, signalled),
+    let code = match cli {
+        Ok(cli) => launch(&comm, &cli, signalled, begun),
         Err(error) => {
             if comm.rank() == 0 {
                 let _ = error.print();
@@ -44,10 +54,10 @@ fn abort_all_ranks_on_panic() {
     }));
 }
 
-fn launch(comm: &Communicator, cli: &Cli, signalled: std::sync::Arc<std::sync::atomic::AtomicBool>) -> i32 {
+fn launch(comm: &Communicator, cli: &Cli, signalled: Arc<AtomicBool>, begun: Instant) -> i32 {
     let folder = RunFolder::new(&cli.run);
     let limits = Limits::new(signalled, &folder);
-    match run(comm, cli, &folder, limits) {
+    match run(comm, cli, &folder, limits, begun) {
         Ok(outcome) => {
             if comm.rank() == 0 {
                 println!("{}", folder.path().display());
@@ -66,41 +76,31 @@ fn launch(comm: &Communicator, cli: &Cli, signalled: std::sync::Arc<std::sync::a
     }
 }
 
-fn run(comm: &Communicator, cli: &Cli, folder: &RunFolder, limits: Limits) -> Result<Outcome, RunError> {
-    let text = share_text(comm, || read_scene(folder))?;
-    let scene = Scene::read(&folder.scene().display().to_string(), &text)?;
-    let lock = agree(comm, || lock(folder))?;
-    let done = share_text(comm, || Ok(String::from(if folder.done().exists() { "done" } else { "" })))?;
-    if done == "done" && !cli.new {
-        if comm.rank() == 0 && !cli.quiet {
-            eprintln!("sph-run: nothing to do, the run is done");
-        }
+fn run(comm: &Communicator, cli: &Cli, folder: &RunFolder, limits: Limits, begun: Instant) -> Result<Outcome, RunError> {
+    // Before the lock, whose folder need not be there.
+    agree(comm, || read_scene(&folder.scene()))?;
+    let lock = agree(comm, || Ok(RunLock::acquire_within(&folder.lock(), cli.lock_patience)?))?;
+    let deadline = agree(comm, || Ok(Deadline::find(cli.wall_limit, begun, cli.quiet)))?.unwrap_or_default();
+    let mut past = Past::default();
+    let start = share_text(comm, || {
+        Ok(match Start::find(folder, cli, comm.size() as u64)? {
+            Some((start, then)) => {
+                past = then;
+                start.to_json().to_string()
+            }
+            None => String::new(),
+        })
+    })?;
+    if start.is_empty() {
         return Ok(Outcome::Done);
     }
-    let start = share_text(comm, || {
-        if cli.new && (folder.done().exists() || folder.checkpoints().exists() || folder.history().exists()) {
-            return Err(RunError::HasBegun { path: folder.path().into() });
-        }
-        Ok(Start::find(folder, cli.quiet)?.to_json().to_string())
-    })?;
-    let start = serde_json::from_str(&start).ok().and_then(|v| Start::from_json(&v));
+    let start = serde_json::from_str(&start).ok().and_then(|value| Start::from_json(&value));
     let Some(start) = start else {
         return Err(RunError::Input { path: folder.checkpoints(), message: "its manifest can't be understood".into() });
     };
-    let scene_hash = Scene::hash(&text);
-    let outcome = dispatch::resolve(&scene, Run { comm, cli, folder, scene: &scene, scene_hash, start, limits });
-    drop(lock);
-    outcome
-}
-
-fn read_scene(folder: &RunFolder) -> Result<String, RunError> {
-    let path = folder.scene();
-    std::fs::read_to_string(&path).map_err(|e| RunError::Input {
-        path,
-        message: format!("{e}\nhelp: make a run folder with: sph-prep scene.toml -o {}", folder.path().display()),
-    })
-}
-
-fn lock(folder: &RunFolder) -> Result<formats::lock::RunLock, RunError> {
-    Ok(formats::lock::RunLock::acquire(&folder.lock())?)
+    let scene = Scene::read(&folder.scene().display().to_string(), &start.scene)?;
+    let scene_hash = Scene::hash(&start.scene);
+    let lock = lock.as_ref();
+    let run = Run { comm, cli, folder, scene: &scene, scene_hash, start, past, limits, deadline, lock };
+    dispatch::resolve(&scene, run)
 }

@@ -1,18 +1,21 @@
-//! Files written while the run goes on: snapshots with their index, the history, and the log of the machine's doings.
+//! Files written while the run goes on: segments of snapshots and history with their index, the views of them for
+//! people, and the log of the machine's doings.
 
 use crate::error::RunError;
 use crate::parallel::gather;
 use crate::physics::Physics;
 use crate::report;
-use crate::simulation::Simulation;
+use crate::simulation::{Clock, Simulation};
 use crate::space::Space as _;
 use formats::folder::RunFolder;
+use formats::outputs::{Index, LONGEST, Segment};
 use formats::scene::Scene;
 use formats::schema::Kept;
-use formats::snapshot::{self, Header, Rows};
+use formats::snapshot::{self, Digests, FileError, Header, Rows};
 use formats::space::Space;
-use std::fs::{self, File, OpenOptions};
-use std::io::{Seek, Write};
+use formats::{checkpoint, disk};
+use std::fs::{self, File};
+use std::io::Write;
 use std::path::Path;
 
 impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
@@ -43,75 +46,125 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     }
 
     /// Writes a particle file. Collective.
-    pub fn write_snapshot(&self, path: &Path, header: &Header, kept: Kept) -> Result<(), RunError> {
+    pub fn write_snapshot(&self, path: &Path, header: &Header, kept: Kept) -> Result<Digests, RunError> {
         Ok(snapshot::write(path, header, &self.rows(), kept, self.comm)?)
     }
 }
 
-/// A text file that grows by lines; rank 0 only.
+/// The outputs of a run, as rank 0 keeps them.
 #[derive(Debug)]
-pub struct Growing {
-    file: File,
-    path: std::path::PathBuf,
+pub struct Outputs {
+    folder: RunFolder,
+    /// Names of the history's columns, a line.
+    head: String,
+    index: Index,
+    /// Lines of the history since the last segment.
+    pending: String,
+    /// `history.csv`.
+    view: File,
+    performance: File,
 }
 
-impl Growing {
-    /// Opens the file and cuts it to `length` bytes; length 0 starts it anew with `head`.
-    pub fn open(path: &Path, length: u64, head: &str) -> Result<Self, RunError> {
-        let fail = |e: std::io::Error| RunError::CannotWrite { path: path.into(), message: e.to_string() };
-        let mut file = OpenOptions::new().create(true).write(true).truncate(false).open(path).map_err(fail)?;
-        if file.metadata().map_err(fail)?.len() < length {
-            let message = format!("shorter than the {length} bytes the checkpoint counts on");
-            return Err(RunError::Input { path: path.into(), message });
+impl Outputs {
+    /// Opens them as they were at a checkpoint (`then`), or at the start of a run: what lies beyond is removed, and the
+    /// views are made anew.
+    pub fn open(folder: &RunFolder, then: checkpoint::Outputs, space: Space) -> Result<Self, RunError> {
+        for path in [folder.out(), folder.history_pieces(), folder.log()] {
+            fs::create_dir_all(&path).map_err(|error| FileError::writing(&path, 0, &error))?;
         }
-        file.set_len(length).map_err(fail)?;
-        file.seek(std::io::SeekFrom::End(0)).map_err(fail)?;
-        let mut growing = Self { file, path: path.into() };
-        if length == 0 {
-            growing.append(head)?;
+        let head = report::columns(space).join(",") + "\n";
+        let index = Index { segments: then.segments, ..Index::default() };
+        let mut history = index.history(folder)?;
+        if history.is_empty() {
+            history.clone_from(&head);
         }
-        Ok(growing)
+        history += &then.pending;
+        remove_what_lies_beyond(folder, &index)?;
+        index.write(folder)?;
+        disk::write_atomic(&folder.history(), history.as_bytes())?;
+        let view = append(&folder.history())?;
+        let log = folder.log().join("performance.csv");
+        let mut performance = append(&log)?;
+        let fault = |error: std::io::Error| FileError::writing(&log, 0, &error);
+        if performance.metadata().map_err(fault)?.len() == 0 {
+            performance.write_all(PERFORMANCE_HEAD.as_bytes()).map_err(fault)?;
+        }
+        let outputs = Self { folder: folder.clone(), head, index, pending: then.pending, view, performance };
+        outputs.write_series()?;
+        Ok(outputs)
     }
 
-    /// Appends a line.
-    pub fn append(&mut self, line: &str) -> Result<(), RunError> {
-        self.file.write_all(line.as_bytes()).map_err(|e| self.error(&e))
+    /// Adds a line to the history.
+    pub fn line(&mut self, line: &str) -> Result<(), RunError> {
+        self.pending += line;
+        let fault = |error| FileError::writing(&self.folder.history(), line.len() as u64, &error);
+        Ok(self.view.write_all(line.as_bytes()).map_err(fault)?)
     }
 
-    /// Makes everything written so far durable; returns the length in bytes.
-    pub fn commit(&mut self) -> Result<u64, RunError> {
-        self.file.sync_all().map_err(|e| self.error(&e))?;
-        Ok(self.file.metadata().map_err(|e| self.error(&e))?.len())
+    /// Ends the segment where no snapshot will for long.
+    pub fn close_if_long(&mut self, clock: &Clock) -> Result<(), RunError> {
+        match self.pending.lines().count() as u64 >= LONGEST {
+            true => self.close(clock, None),
+            false => Ok(()),
+        }
     }
 
-    fn error(&self, e: &std::io::Error) -> RunError {
-        RunError::CannotWrite { path: self.path.clone(), message: e.to_string() }
+    /// Ends the segment: its lines get their file and the index its entry. `snapshot`: number and digest of the one
+    /// that was just written.
+    pub fn close(&mut self, clock: &Clock, snapshot: Option<(u64, String)>) -> Result<(), RunError> {
+        let end = (self.index.segments.len() as u64, clock.step, clock.time);
+        let segment = Segment::write(&self.folder, end, &self.head, &self.pending, snapshot)?;
+        self.index.segments.push(segment);
+        self.pending.clear();
+        self.index.write(&self.folder)?;
+        self.write_series()
+    }
+
+    /// What belongs to a checkpoint written now.
+    pub fn now(&self) -> checkpoint::Outputs {
+        checkpoint::Outputs { segments: self.index.segments.clone(), pending: self.pending.clone() }
+    }
+
+    /// Adds a line to the log of rates. Nothing depends on it, so a failure is none of the run's.
+    pub fn log_performance(&mut self, line: &str) {
+        let _ = self.performance.write_all(line.as_bytes());
+    }
+
+    /// The snapshots with their times, which ParaView opens as a series. Users move old snapshots away: it lists what
+    /// is there.
+    fn write_series(&self) -> Result<(), RunError> {
+        let there = self.index.snapshots().filter(|&(number, _)| self.folder.snapshot(number).exists());
+        let name = |k: u64| self.folder.snapshot(k).file_name().map(|n| n.to_string_lossy().into_owned());
+        let files: Vec<_> = there.map(|(k, time)| serde_json::json!({ "name": name(k), "time": time })).collect();
+        let series = serde_json::json!({ "file-series-version": "1.0", "files": files });
+        Ok(disk::write_atomic(&self.folder.series(), format!("{series:#}\n").as_bytes())?)
     }
 }
 
-/// First line of the history.
-pub fn history_head(space: Space) -> String {
-    report::columns(space).join(",") + "\n"
+fn append(path: &Path) -> Result<File, FileError> {
+    File::options().create(true).append(true).open(path).map_err(|error| FileError::writing(path, 0, &error))
+}
+
+/// Removes snapshots and pieces of history that the index does not list, and what was being written.
+fn remove_what_lies_beyond(folder: &RunFolder, index: &Index) -> Result<(), FileError> {
+    let snapshots = index.snapshots().map(|(number, _)| folder.snapshot(number));
+    let pieces = index.segments.iter().map(|segment| folder.history_piece(segment.number));
+    let listed: std::collections::HashSet<_> = snapshots.chain(pieces).collect();
+    for place in [folder.out(), folder.history_pieces()] {
+        let reading = |error| FileError::reading(&place, &error);
+        for entry in fs::read_dir(&place).map_err(reading)? {
+            let path = entry.map_err(reading)?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let ours = name.starts_with("snapshot-") && name.ends_with(".hdf")
+                || place == folder.history_pieces() && name.ends_with(".csv")
+                || name.ends_with(".tmp");
+            if ours && path.is_file() && !listed.contains(&path) {
+                fs::remove_file(&path).map_err(|error| FileError::writing(&path, 0, &error))?;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// First line of the log of rates.
-pub const PERFORMANCE_HEAD: &str =
-    "time [s],step [1],wall [s],particle_steps_per_second [1/s],imbalance [1],ranks [1]\n";
-
-/// Writes the index of the snapshots, which ParaView opens as a series in time.
-pub fn write_series(folder: &RunFolder, times: &[(u64, f64)]) -> Result<(), RunError> {
-    let name = |k: u64| folder.snapshot(k).file_name().map(|n| n.to_string_lossy().into_owned());
-    let files: Vec<_> = times.iter().map(|&(k, time)| serde_json::json!({ "name": name(k), "time": time })).collect();
-    let series = serde_json::json!({ "file-series-version": "1.0", "files": files });
-    replace(&folder.series(), &format!("{series:#}\n"))
-}
-
-/// Replaces a small text file as a whole.
-pub fn replace(path: &Path, text: &str) -> Result<(), RunError> {
-    let fail = |e: std::io::Error| RunError::CannotWrite { path: path.into(), message: e.to_string() };
-    let new = path.with_extension("tmp");
-    let mut file = File::create(&new).map_err(fail)?;
-    file.write_all(text.as_bytes()).map_err(fail)?;
-    file.sync_all().map_err(fail)?;
-    fs::rename(&new, path).map_err(fail)
-}
+const PERFORMANCE_HEAD: &str = "time [s],step [1],wall [s],particle_steps_per_second [1/s],imbalance [1],ranks [1]\n";

@@ -1,6 +1,7 @@
 //! News for the user: a bar on a terminal, plain lines under mpirun, in a pipe or in a batch log. Rank 0 only.
 
 use crate::simulation::Clock;
+use formats::journal;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -27,7 +28,12 @@ pub struct Progress {
     start_step: u64,
     end: f64,
     particles: u64,
+    /// When the last report for scripts was made.
+    reported: Option<Instant>,
 }
+
+/// Time between reports for scripts.
+const REPORT: Duration = Duration::from_secs(5);
 
 impl Progress {
     /// For a run from the clock's time to `end`. Silent on other ranks and when told to be.
@@ -38,7 +44,8 @@ impl Progress {
             Ok(style) if std::io::stderr().is_terminal() => Sink::Bar(ProgressBar::new(TICKS).with_style(style)),
             _ => Sink::Lines { next: 0.0, last: Instant::now() },
         };
-        Self { sink, start: Instant::now(), start_time: clock.time, start_step: clock.step, end, particles }
+        let (start, start_time, start_step) = (Instant::now(), clock.time, clock.step);
+        Self { sink, start, start_time, start_step, end, particles, reported: None }
     }
 
     /// Particle-steps per second since the start.
@@ -52,10 +59,43 @@ impl Progress {
         self.start.elapsed().as_secs_f64()
     }
 
+    /// Seconds to the end time, if it goes on as since the start.
+    fn left(&self, clock: &Clock) -> Option<f64> {
+        let done = clock.time - self.start_time;
+        (done > 0.0).then(|| self.elapsed() * (self.end - clock.time) / done)
+    }
+
+    /// Is it time for a report for scripts? Then it counts as made.
+    pub fn due(&mut self) -> bool {
+        let due = self.reported.is_none_or(|at| at.elapsed() >= REPORT);
+        if due {
+            self.reported = Some(Instant::now());
+        }
+        due
+    }
+
+    /// The report for scripts, without what only the job knows.
+    pub fn report(&self, clock: &Clock, ranks: u64) -> journal::Progress {
+        journal::Progress {
+            time: clock.time,
+            end: self.end,
+            step: clock.step,
+            time_step: clock.time_step,
+            particles: self.particles,
+            ranks,
+            rate: self.rate(clock),
+            elapsed: self.elapsed(),
+            left: self.left(clock),
+            updated: formats::provenance::now(),
+            job: None,
+            deadline: None,
+        }
+    }
+
     /// Tells the news, if it is time to.
     pub fn tell(&mut self, clock: &Clock) {
         let done = clock.time / self.end;
-        let rate = self.rate(clock);
+        let (rate, left) = (self.rate(clock), self.left(clock));
         match &mut self.sink {
             Sink::Bar(bar) => {
                 if clock.step.is_multiple_of(16) {
@@ -64,12 +104,9 @@ impl Progress {
                 }
             }
             Sink::Lines { next, last } if done >= *next || last.elapsed() > SILENCE => {
-                let progress = (clock.time - self.start_time) / (self.end - self.start_time).max(1e-300);
-                let elapsed = self.start.elapsed().as_secs_f64();
-                let left = if progress > 0.0 { elapsed / progress - elapsed } else { f64::NAN };
                 *next = (done * 10.0).floor() / 10.0 + 0.1;
                 *last = Instant::now();
-                let left = if left.is_finite() { format!(", about {left:.0} s left") } else { String::new() };
+                let left = left.map_or_else(String::new, |left| format!(", about {left:.0} s left"));
                 eprintln!(
                     "{:>3.0} %  t = {:.4} s, step {}, dt = {:.2e} s, {rate:.2e} particle-steps/s{left}",
                     100.0 * done,

@@ -1,44 +1,110 @@
 //! Where a run starts: at the particles `sph-prep` made, or at the newest valid checkpoint. Rank 0 looks and decides,
 //! all ranks learn the same.
 
+use crate::cli::Cli;
 use crate::error::RunError;
-use crate::output::{self, Growing};
 use crate::simulation::Clock;
 use formats::folder::RunFolder;
-use formats::space::Space;
-use formats::{checkpoint, snapshot};
-use std::path::PathBuf;
+use formats::journal::Event;
+use formats::scene::{Change, Output, Scene};
+use formats::{checkpoint, disk, snapshot::FileError};
+use std::fs;
+use std::path::{Path, PathBuf};
 
-/// Where and when a run starts.
+/// Where and when a run starts: the same on all ranks.
 #[derive(Clone, Debug)]
 pub struct Start {
+    /// Text of the scene.
+    pub scene: String,
     /// Particle file to read.
     pub particles: PathBuf,
     pub clock: Clock,
-    /// Length of the history that belongs to the checkpoint, bytes.
-    pub history_length: u64,
     /// Had the run reached its end? Then it was killed before it was marked as done.
     pub over: bool,
 }
 
+/// What only rank 0 needs of it.
+#[derive(Clone, Debug, Default)]
+pub struct Past {
+    pub outputs: checkpoint::Outputs,
+    /// What writing the checkpoint took, s; none at the beginning.
+    pub write_seconds: Option<f64>,
+}
+
 impl Start {
-    /// Looks for the newest valid checkpoint; rank 0 only. Warnings about damaged ones go to standard error.
-    pub fn find(folder: &RunFolder, quiet: bool) -> Result<Self, RunError> {
-        let Some(checkpoint::Found { manifest, state, warnings }) = checkpoint::latest(folder)? else {
-            let particles = folder.initial();
-            return Ok(Self { particles, clock: Clock::default(), history_length: 0, over: false });
+    /// Applies a changed scene, and looks for the newest valid checkpoint; rank 0 only, in a folder that is locked.
+    /// `None` where the run is done. Warnings and news go to standard error.
+    pub fn find(folder: &RunFolder, cli: &Cli, ranks: u64) -> Result<Option<(Self, Past)>, RunError> {
+        let begun = folder.done().exists() || folder.checkpoints().exists() || folder.history().exists();
+        if cli.new && begun {
+            return Err(RunError::HasBegun { path: folder.path().into() });
+        }
+        let prepared = read_scene(&folder.scene())?;
+        let scene = match &cli.scene {
+            None => prepared,
+            Some(path) => changed_scene(folder, prepared, path)?,
         };
-        for warning in warnings {
-            eprintln!("sph-run: warning: {warning}; an older checkpoint is used");
+        if folder.done().exists() {
+            let then = checkpoint::newest_manifest(folder)?;
+            let extended = match &then {
+                Some(manifest) => !compare(folder, &manifest.scene, &scene)?.is_empty(),
+                None => false,
+            };
+            if !extended {
+                if !cli.quiet {
+                    eprintln!("sph-run: nothing to do, the run is done");
+                }
+                return Ok(None);
+            }
+            fs::remove_file(folder.done()).map_err(|error| FileError::writing(&folder.done(), 0, &error))?;
         }
-        let clock = clock_from_json(&manifest.clock, manifest.step)
-            .ok_or_else(|| RunError::Input { path: state.clone(), message: "its manifest lacks the clock".into() })?;
-        if !quiet {
-            eprintln!("sph-run: resuming at t = {:.4} s, step {}", clock.time, clock.step);
+        let (mut start, past, then) = match checkpoint::latest(folder)? {
+            None => {
+                let start = Self { scene, particles: folder.initial(), clock: Clock::default(), over: false };
+                (start, Past::default(), None)
+            }
+            Some(checkpoint::Found { manifest, state, warnings }) => {
+                for warning in warnings {
+                    eprintln!("sph-run: warning: {warning}; an older checkpoint is used");
+                }
+                let message = String::from("its manifest lacks the clock");
+                let clock = clock_from_json(&manifest.clock, manifest.step)
+                    .ok_or_else(|| RunError::Input { path: state.clone(), message })?;
+                let over = manifest.clock["over"].as_bool().unwrap_or(false);
+                let past = Past { outputs: manifest.outputs, write_seconds: Some(manifest.write_seconds) };
+                (Self { scene, particles: state, clock, over }, past, Some(manifest.scene))
+            }
+        };
+        if let Some(then) = then {
+            start.adapt(folder, &then, cli.quiet, ranks)?;
         }
-        let history_length = manifest.outputs.get("out/history.csv").copied().unwrap_or(0);
-        let over = manifest.clock["over"].as_bool().unwrap_or(false);
-        Ok(Self { particles: state, clock, history_length, over })
+        if !start.fresh() && !cli.quiet {
+            eprintln!("sph-run: resuming at t = {:.4} s, step {}", start.clock.time, start.clock.step);
+        }
+        Ok(Some((start, past)))
+    }
+
+    /// Takes up what changed in the scene since the checkpoint was written under `then`.
+    fn adapt(&mut self, folder: &RunFolder, then: &str, quiet: bool, ranks: u64) -> Result<(), RunError> {
+        let changes = compare(folder, then, &self.scene)?;
+        if changes.is_empty() {
+            return Ok(());
+        }
+        for change in &changes {
+            if !quiet {
+                eprintln!("sph-run: changed in the scene: {change}");
+            }
+            let event = Event::now("scene-changed", self.clock.step, self.clock.time, ranks);
+            let _ = fs::create_dir_all(folder.log());
+            let _ = Event { what: change.to_string(), ..event }.append(folder);
+        }
+        let scene = Scene::read(&folder.scene().display().to_string(), &self.scene)?;
+        self.over = false;
+        if !self.fresh() {
+            self.clock.line_event = Output::first_after(scene.output.history, self.clock.time);
+            self.clock.snapshot_event = Output::first_after(scene.output.snapshots, self.clock.time);
+        }
+        Ok(())
     }
 
     /// Does the run start at its beginning?
@@ -49,21 +115,48 @@ impl Start {
     /// As text, for the other ranks.
     pub fn to_json(&self) -> serde_json::Value {
         serde_json::json!({
+            "scene": self.scene,
             "particles": self.particles,
             "step": self.clock.step,
             "clock": clock_to_json(&self.clock, self.over),
-            "history_length": self.history_length,
         })
     }
 
     /// The inverse of [`Start::to_json`].
     pub fn from_json(value: &serde_json::Value) -> Option<Self> {
         Some(Self {
+            scene: value["scene"].as_str()?.to_owned(),
             particles: PathBuf::from(value["particles"].as_str()?),
             clock: clock_from_json(&value["clock"], value["step"].as_u64()?)?,
-            history_length: value["history_length"].as_u64()?,
             over: value["clock"]["over"].as_bool()?,
         })
+    }
+}
+
+/// The scene of a run folder, or one that a user gives.
+pub fn read_scene(path: &Path) -> Result<String, RunError> {
+    fs::read_to_string(path).map_err(|error| {
+        let help = "make a run folder with: sph-prep scene.toml -o RUN";
+        RunError::Input { path: path.into(), message: format!("{error}\nhelp: {help}") }
+    })
+}
+
+/// The text of a scene that shall replace the prepared one, after it has: refused where it asks for other particles
+/// or other physics.
+fn changed_scene(folder: &RunFolder, prepared: String, path: &Path) -> Result<String, RunError> {
+    let text = read_scene(path)?;
+    Scene::read(&path.display().to_string(), &text)?;
+    if Scene::changes(&path.display().to_string(), &prepared, &text)?.is_empty() {
+        return Ok(prepared);
+    }
+    disk::write_atomic(&folder.scene(), text.as_bytes())?;
+    Ok(text)
+}
+
+fn compare(folder: &RunFolder, then: &str, now: &str) -> Result<Vec<Change>, RunError> {
+    match then == now {
+        true => Ok(Vec::new()),
+        false => Ok(Scene::changes(&folder.scene().display().to_string(), then, now)?),
     }
 }
 
@@ -75,7 +168,9 @@ pub fn clock_to_json(clock: &Clock, over: bool) -> serde_json::Value {
         "time_step_bits": clock.time_step.to_bits(),
         "peak_kinetic_bits": clock.peak_kinetic.to_bits(),
         "snapshots": clock.snapshots,
+        "snapshot_event": clock.snapshot_event,
         "lines": clock.lines,
+        "line_event": clock.line_event,
         "over": over,
     })
 }
@@ -88,34 +183,8 @@ fn clock_from_json(value: &serde_json::Value, step: u64) -> Option<Clock> {
         time_step: real("time_step_bits")?,
         peak_kinetic: real("peak_kinetic_bits")?,
         snapshots: value["snapshots"].as_u64()?,
+        snapshot_event: value["snapshot_event"].as_u64()?,
         lines: value["lines"].as_u64()?,
+        line_event: value["line_event"].as_u64()?,
     })
-}
-
-/// Files rank 0 keeps open.
-#[derive(Debug)]
-pub struct Files {
-    pub history: Growing,
-    pub performance: Growing,
-    /// Number and time of every snapshot that is there.
-    pub snapshot_times: Vec<(u64, f64)>,
-}
-
-impl Files {
-    /// Opens them, cut back to what belongs to the start.
-    pub fn open(folder: &RunFolder, start: &Start, space: Space) -> Result<Self, RunError> {
-        for path in [folder.out(), folder.log()] {
-            std::fs::create_dir_all(&path)
-                .map_err(|e| RunError::CannotWrite { path: path.clone(), message: e.to_string() })?;
-        }
-        let history = Growing::open(&folder.history(), start.history_length, &output::history_head(space))?;
-        let log = folder.log().join("performance.csv");
-        let logged = if start.fresh() { 0 } else { std::fs::metadata(&log).map_or(0, |m| m.len()) };
-        let performance = Growing::open(&log, logged, output::PERFORMANCE_HEAD)?;
-        // A user may have moved earlier snapshots away to save space: the index lists what is there.
-        let times = (0..start.clock.snapshots)
-            .filter(|&k| folder.snapshot(k).exists())
-            .map(|k| snapshot::read_header(&folder.snapshot(k)).map(|header| (k, header.time)));
-        Ok(Self { history, performance, snapshot_times: times.collect::<Result<_, _>>()? })
-    }
 }

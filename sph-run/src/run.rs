@@ -1,24 +1,30 @@
 //! A run from start or checkpoint to its end: what is due when.
 
 use crate::cli::{Cadence, Cli};
+use crate::deadline::Deadline;
 use crate::dispatch::Job;
 use crate::error::{Fault, RunError};
-use crate::limits::Limits;
-use crate::output;
+use crate::limits::{Limits, Reason};
+use crate::output::Outputs;
+use crate::pace::Pace;
 use crate::parallel::Reduce;
 use crate::parallel::agree::agree;
 use crate::particles::Particles;
 use crate::physics::Physics;
 use crate::progress::Progress;
 use crate::report::Scales;
-use crate::resume::{Files, Start};
+use crate::resume::{Past, Start};
 use crate::simulation::Simulation;
+use crate::timestep::Requests;
 use formats::folder::RunFolder;
 use formats::h5::{self, Communicator};
+use formats::journal::{self, Event};
+use formats::lock::RunLock;
 use formats::scene::Scene;
 use formats::schema::Kept;
-use formats::{checkpoint, snapshot};
-use std::time::Instant;
+use formats::snapshot::FileError;
+use formats::{checkpoint, disk, snapshot};
+use std::time::{Duration, Instant};
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,12 +44,17 @@ pub struct Run<'a> {
     pub scene_hash: String,
     pub start: Start,
     pub limits: Limits,
+    /// What follows counts on rank 0 only.
+    pub past: Past,
+    pub deadline: Deadline,
+    /// On no other rank there is one.
+    pub lock: Option<&'a RunLock>,
 }
 
 impl Job for Run<'_> {
     type Output = Result<Outcome, RunError>;
 
-    fn run<const D: usize, const N: usize, P: Physics<D, N>>(self, material: P::Material) -> Self::Output {
+    fn run<const D: usize, const N: usize, P: Physics<D, N>>(mut self, material: P::Material) -> Self::Output {
         // Every rank reads for itself; a file that only one of them can't read must still end them all.
         let header = h5::agree(self.comm, snapshot::read_header(&self.start.particles))?;
         if header.scene_hash != self.scene_hash {
@@ -64,10 +75,15 @@ impl Job for Run<'_> {
         if self.start.fresh() {
             simulation.begin();
         }
-        let files = agree(self.comm, || Files::open(self.folder, &self.start, self.scene.space))?;
+        let then = std::mem::take(&mut self.past.outputs);
+        let outputs = agree(self.comm, || Outputs::open(self.folder, then, self.scene.space))?;
         let progress = Progress::new(self.cli.quiet || rank != 0, &simulation.clock, self.scene.end.time, count);
-        Course { scales: Scales::new(self.scene), job: self, simulation, files, progress, checkpointed: Instant::now() }
-            .follow()
+        let pace = Pace::new(self.past.write_seconds.map(Duration::from_secs_f64));
+        let scales = Scales::new(self.scene);
+        let (checkpointed, checkpoint_step) = (Instant::now(), simulation.clock.step);
+        let course =
+            Course { scales, job: self, simulation, outputs, progress, pace, checkpointed, checkpoint_step };
+        course.follow()
     }
 }
 
@@ -77,9 +93,12 @@ struct Course<'a, const D: usize, const N: usize, P: Physics<D, N>> {
     simulation: Simulation<'a, D, N, P>,
     scales: Scales,
     /// Rank 0 only.
-    files: Option<Files>,
+    outputs: Option<Outputs>,
     progress: Progress,
+    pace: Pace,
+    /// When and at which step the last checkpoint was written, or the launch began.
     checkpointed: Instant,
+    checkpoint_step: u64,
 }
 
 impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
@@ -88,25 +107,31 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         if self.job.start.over {
             return self.finish();
         }
+        self.note(if self.job.start.fresh() { "start" } else { "resume" }, "");
         let mut over = self.outputs_due()?;
+        agree(self.job.comm, || self.check_wall_limit())?;
         while !over {
+            let begun = Instant::now();
             if self.job.cli.stop_after_steps.is_some_and(|n| self.simulation.clock.step >= first + n) {
-                return self.stop();
+                return self.stop(Reason::Steps);
             }
             let requests = self.requests();
             let plan = match self.simulation.plan(self.next_event(), requests) {
                 Ok(plan) => plan,
                 Err(fault) => return Err(self.keep_for_diagnosis(fault)),
             };
-            if plan.requests.stop {
-                return self.stop();
+            if let Some(reason) = plan.requests.stop {
+                return self.stop(reason);
             }
             if plan.requests.checkpoint {
                 self.checkpoint(false)?;
+                continue;
             }
             self.simulation.step(&plan);
+            self.pace.stepped(begun.elapsed());
             over = self.outputs_due()?;
             self.progress.tell(&self.simulation.clock);
+            self.report_progress();
         }
         self.checkpoint(true)?;
         self.finish()
@@ -116,15 +141,44 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
     fn finish(&self) -> Result<Outcome, RunError> {
         self.progress.finish();
         let (folder, comm) = (self.job.folder, self.job.comm);
-        agree(comm, || output::replace(&folder.done(), "the run reached its end\n"))?;
+        agree(comm, || Ok(disk::write_atomic(&folder.done(), b"the run reached its end\n")?))?;
+        self.note("done", "");
         Ok(Outcome::Done)
+    }
+
+    /// Notes in the journal what happens; rank 0 only. Nothing depends on it, so a failure is none of the run's.
+    fn note(&self, event: &str, what: &str) {
+        if self.job.lock.is_some() {
+            let (clock, ranks) = (&self.simulation.clock, self.job.comm.size() as u64);
+            let now = Event::now(event, clock.step, clock.time, ranks);
+            let _ = Event { job: self.job.deadline.job.clone(), what: what.into(), ..now }.append(self.job.folder);
+        }
+    }
+
+    /// Tells scripts and people how far the run is, if it is time to; rank 0 only.
+    fn report_progress(&mut self) {
+        let job = &self.job;
+        if job.lock.is_some() && self.progress.due() {
+            let ranks = job.comm.size() as u64;
+            let report = self.progress.report(&self.simulation.clock, ranks);
+            let (job_id, deadline) = (job.deadline.job.clone(), job.deadline.text());
+            let _ = journal::Progress { job: job_id, deadline, ..report }.write(job.folder);
+        }
+    }
+
+    /// A limit that leaves no time for a step and for ending would be reached again and again.
+    fn check_wall_limit(&self) -> Result<(), RunError> {
+        match self.job.deadline.left() {
+            Some(left) => self.pace.check_limit(left).map_err(RunError::LimitTooShort),
+            None => Ok(()),
+        }
     }
 
     /// The next time at which a line, a snapshot or the end is due.
     fn next_event(&self) -> f64 {
         let (clock, output) = (&self.simulation.clock, &self.job.scene.output);
-        let line = clock.lines as f64 * output.history;
-        let snapshot = clock.snapshots as f64 * output.snapshots;
+        let line = clock.line_event as f64 * output.history;
+        let snapshot = clock.snapshot_event as f64 * output.snapshots;
         line.min(snapshot).min(self.job.scene.end.time)
     }
 
@@ -134,24 +188,28 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         // Two events that differ by rounding only are one.
         let due = |event: f64, interval: f64| clock.time + 1e-9 * interval >= event;
         let mut over = due(scene.end.time, scene.output.history);
-        let line_due = over || due(clock.lines as f64 * scene.output.history, scene.output.history);
-        let snapshot_due = over || due(clock.snapshots as f64 * scene.output.snapshots, scene.output.snapshots);
-        if line_due || snapshot_due {
+        let line_event = due(clock.line_event as f64 * scene.output.history, scene.output.history);
+        let snapshot_event = due(clock.snapshot_event as f64 * scene.output.snapshots, scene.output.snapshots);
+        self.simulation.clock.line_event += u64::from(line_event);
+        self.simulation.clock.snapshot_event += u64::from(snapshot_event);
+        if over || line_event || snapshot_event {
             self.check_finite()?;
         }
-        let mut at_rest = false;
-        if line_due {
+        if over || line_event {
             let line = self.simulation.totals(&self.scales);
             let peak = clock.peak_kinetic.max(line.kinetic);
-            at_rest = scene.end.at_rest.is_some_and(|fraction| line.kinetic < fraction * peak);
+            over |= scene.end.at_rest.is_some_and(|fraction| line.kinetic < fraction * peak);
             self.simulation.clock.peak_kinetic = peak;
             self.simulation.clock.lines += 1;
             let text = line.csv(&clock);
-            let files = &mut self.files;
-            agree(self.job.comm, || files.as_mut().map_or(Ok(()), |f| f.history.append(&text)))?;
+            let outputs = &mut self.outputs;
+            agree(self.job.comm, || {
+                let Some(outputs) = outputs else { return Ok(()) };
+                outputs.line(&text)?;
+                if over || snapshot_event { Ok(()) } else { outputs.close_if_long(&clock) }
+            })?;
         }
-        over |= at_rest;
-        if over || snapshot_due {
+        if over || snapshot_event {
             self.snapshot()?;
         }
         Ok(over)
@@ -172,68 +230,99 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         Ok(())
     }
 
+    /// Writes a snapshot, which ends a segment of the outputs. Collective.
     fn snapshot(&mut self) -> Result<(), RunError> {
-        let path = self.job.folder.snapshot(self.simulation.clock.snapshots);
+        let begun = Instant::now();
+        let (comm, folder) = (self.job.comm, self.job.folder);
+        agree(comm, || self.still_ours())?;
+        let number = self.simulation.clock.snapshots;
         let header = self.simulation.header(self.job.scene, &self.job.scene_hash);
-        self.simulation.write_snapshot(&path, &header, Kept::Everywhere)?;
+        let digests = self.simulation.write_snapshot(&folder.snapshot(number), &header, Kept::Everywhere)?;
         self.simulation.clock.snapshots += 1;
         let imbalance = self.simulation.imbalance();
-        let (clock, folder, ranks) = (self.simulation.clock, self.job.folder, self.job.comm.size());
+        let clock = self.simulation.clock;
         let (rate, wall) = (self.progress.rate(&clock), self.progress.elapsed());
-        let files = &mut self.files;
-        agree(self.job.comm, || {
-            let Some(files) = files else { return Ok(()) };
-            files.snapshot_times.push((clock.snapshots - 1, clock.time));
-            output::write_series(folder, &files.snapshot_times)?;
-            let (time, step) = (clock.time, clock.step);
-            files.performance.append(&format!("{time:e},{step},{wall:.3},{rate:.4e},{imbalance:.4},{ranks}\n"))
+        let outputs = &mut self.outputs;
+        agree(comm, || {
+            let Some(outputs) = outputs else { return Ok(()) };
+            outputs.close(&clock, Some((number, digests.of_file(&header))))?;
+            let (time, step, ranks) = (clock.time, clock.step, comm.size());
+            outputs.log_performance(&format!("{time:e},{step},{wall:.3},{rate:.4e},{imbalance:.4},{ranks}\n"));
+            Ok(())
         })?;
+        self.pace.wrote_snapshot(begun.elapsed());
         Ok(())
     }
 
+    /// Does the folder still belong to this launch? A process that was stopped for long may have lost it to another.
+    fn still_ours(&self) -> Result<(), RunError> {
+        Ok(self.job.lock.map_or(Ok(()), RunLock::still_ours)?)
+    }
+
     /// What this rank asks of all.
-    fn requests(&mut self) -> crate::timestep::Requests {
+    fn requests(&mut self) -> Requests {
         let root = self.job.comm.rank() == 0;
+        let since = self.checkpointed.elapsed();
         let checkpoint = match self.job.cli.checkpoint_every {
             Cadence::Steps(n) => {
-                self.simulation.clock.step > self.job.start.clock.step && self.simulation.clock.step.is_multiple_of(n)
+                let step = self.simulation.clock.step;
+                step > self.checkpoint_step && step.is_multiple_of(n)
             }
-            Cadence::Wall(interval) => root && self.checkpointed.elapsed() >= interval,
+            Cadence::Wall(interval) => root && since >= interval,
+            Cadence::Auto => root && since >= self.pace.checkpoint_interval(self.job.cli.mtbf),
         };
-        crate::timestep::Requests { stop: self.job.limits.stop(root), checkpoint }
+        let out_of_time = self.job.deadline.left().is_some_and(|left| left <= self.pace.margin());
+        let stop = match self.job.limits.stop(root) {
+            None if out_of_time => Some(Reason::WallLimit),
+            asked => asked,
+        };
+        Requests { stop, checkpoint }
     }
 
     /// Writes a checkpoint; `over`: of a run that has reached its end. Collective.
     fn checkpoint(&mut self, over: bool) -> Result<(), RunError> {
-        let folder = self.job.folder;
-        let files = &mut self.files;
-        let length = agree(self.job.comm, || files.as_mut().map_or(Ok(0), |f| f.history.commit()))?.unwrap_or(0);
-        let header = self.simulation.header(self.job.scene, &self.job.scene_hash);
-        let rows = self.simulation.rows();
-        let outputs = std::collections::BTreeMap::from([("out/history.csv".to_owned(), length)]);
-        checkpoint::commit(
-            folder,
-            &header,
-            &rows,
-            &crate::resume::clock_to_json(&self.simulation.clock, over),
-            &outputs,
-            self.job.cli.checkpoint_keep as usize,
-            self.job.comm,
-        )?;
+        let begun = Instant::now();
+        let job = &self.job;
+        let outputs = self.outputs.as_ref().map(Outputs::now);
+        let still_ours = || {
+            let lost = |error: RunError| FileError::CannotWrite { path: "LOCK".into(), what: error.to_string() };
+            self.still_ours().map_err(lost)
+        };
+        let new = checkpoint::Generation {
+            folder: job.folder,
+            header: &self.simulation.header(job.scene, &job.scene_hash),
+            rows: &self.simulation.rows(),
+            clock: &crate::resume::clock_to_json(&self.simulation.clock, over),
+            outputs: outputs.as_ref(),
+            scene: &job.start.scene,
+            job: job.deadline.job.as_deref(),
+            keep: checkpoint::Keep {
+                newest: job.cli.checkpoint_keep as usize,
+                archive: job.cli.checkpoint_archive,
+            },
+            still_ours: &still_ours,
+        };
+        let generation = checkpoint::commit(&new, job.comm)?;
+        self.note("checkpoint", &format!("gen-{generation:06} in {:.3} s", begun.elapsed().as_secs_f64()));
+        self.pace.wrote_checkpoint(begun.elapsed());
         self.checkpointed = Instant::now();
+        self.checkpoint_step = self.simulation.clock.step;
         Ok(())
     }
 
-    fn stop(mut self) -> Result<Outcome, RunError> {
+    /// Ends early, with a checkpoint.
+    fn stop(mut self, reason: Reason) -> Result<Outcome, RunError> {
         self.check_finite()?;
         self.checkpoint(false)?;
         self.progress.finish();
-        let folder = self.job.folder;
-        // The request is honoured once.
+        let (folder, clock) = (self.job.folder, self.simulation.clock);
         agree(self.job.comm, || {
+            // The request is honoured once.
             let _ = std::fs::remove_file(folder.stop());
-            Ok(())
+            let text = serde_json::json!({ "reason": reason.name(), "step": clock.step, "time": clock.time });
+            Ok(disk::write_atomic(&folder.to_continue(), format!("{text}\n").as_bytes())?)
         })?;
+        self.note("stop", reason.name());
         Ok(Outcome::Stopped)
     }
 

@@ -57,8 +57,12 @@ pub struct Clock {
     pub peak_kinetic: f64,
     /// Snapshots written.
     pub snapshots: u64,
+    /// The next one is due after so many of its intervals.
+    pub snapshot_event: u64,
     /// Lines of history written.
     pub lines: u64,
+    /// The next one is due after so many of its intervals.
+    pub line_event: u64,
 }
 
 /// How the particles are shared out.

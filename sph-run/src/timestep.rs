@@ -2,15 +2,16 @@
 //! request, so that all ranks decide alike.
 
 use crate::error::Fault;
+use crate::limits::Reason;
 use crate::parallel::comm::Reduce;
 use crate::physics::Physics;
 use crate::simulation::Simulation;
 
-/// Requests to all ranks, each either 0 or 1.
+/// Requests to all ranks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Requests {
-    /// Stop after a checkpoint.
-    pub stop: bool,
+    /// Stop after a checkpoint, and why.
+    pub stop: Option<Reason>,
     /// Write a checkpoint.
     pub checkpoint: bool,
 }
@@ -49,7 +50,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             *a2 = a2.max(a);
             *moved2 = moved2.max((p.x[i] - self.x_build[i]).norm2());
         }
-        *stop = f64::from(u8::from(requests.stop));
+        *stop = f64::from(requests.stop.map_or(0, Reason::code));
         *checkpoint = f64::from(u8::from(requests.checkpoint));
         self.comm.max(&mut largest);
         let [v2, a2, moved2, invalid, stop, checkpoint] = largest;
@@ -74,7 +75,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             time_step,
             time,
             lists_go_stale: travel > 0.5 * par.skin * (1.0 - 1e-9),
-            requests: Requests { stop: stop > 0.0, checkpoint: checkpoint > 0.0 },
+            requests: Requests { stop: Reason::of_code(stop as u8), checkpoint: checkpoint > 0.0 },
         })
     }
 }

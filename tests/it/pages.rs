@@ -154,7 +154,7 @@ fn stale(results: &str, validated: &BTreeSet<String>, hash_now: impl Fn(&str) ->
 fn the_figures_are_those_of_the_scenes_as_they_are() {
     let hash_now = |case: &str| {
         let text = std::fs::read_to_string(repository().join("workflows/cases").join(case).join("scene.toml")).ok()?;
-        Some(Scene::hash(&text)[..HASH_DIGITS].to_owned())
+        Some(Scene::text_hash(&text)[..HASH_DIGITS].to_owned())
     };
     let faults = stale(&page("tests/validation/RESULTS.md"), &validated_cases(), hash_now);
     let advice = "tests/validation/RESULTS.md is out of date; run ./talus validate --reuse";

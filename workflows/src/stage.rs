@@ -2,7 +2,12 @@
 
 use crate::launch::{self, Stop};
 use crate::{failure::Failure, paths};
-use formats::{exit, folder::RunFolder, snapshot};
+use formats::{
+    exit,
+    folder::RunFolder,
+    scene::{Change, Scene},
+    snapshot,
+};
 use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use xshell::{Shell, cmd};
@@ -83,14 +88,15 @@ pub fn run(programs: &Programs, job: &Job) -> Result<(), Failure> {
     compute(programs, job)
 }
 
-/// The first stage: leaves a folder prepared from the job's scene, which may be one that was there before.
+/// The first stage: leaves a folder prepared from the job's scene, which may be one that was there before. Of a run that is
+/// there the scene may have changed in what sph-run takes up while it goes on.
 pub fn prepare(programs: &Programs, job: &Job) -> Result<(), Failure> {
     let folder = RunFolder::new(job.folder);
     if job.fresh {
         remove(&folder)?;
     }
     match is_occupied(job.folder) {
-        true => same_scene(&folder, job),
+        true => changes(&folder, job).map(|_| ()),
         false => sph_prep(programs, job),
     }
 }
@@ -99,7 +105,11 @@ pub fn prepare(programs: &Programs, job: &Job) -> Result<(), Failure> {
 pub fn compute(programs: &Programs, job: &Job) -> Result<(), Failure> {
     let folder = RunFolder::new(job.folder);
     let name = paths::short(job.folder).display().to_string();
-    if folder.done().is_file() {
+    let changes = changes(&folder, job)?;
+    for change in &changes {
+        say(job, &format!("{name}: the scene has changed: {change}"));
+    }
+    if folder.done().is_file() && changes.is_empty() {
         say(job, &format!("{name} is done: only the results are made again (--fresh starts over)"));
     } else {
         let header = snapshot::read_header(&folder.initial()).map_err(|e| Failure {
@@ -110,6 +120,10 @@ pub fn compute(programs: &Programs, job: &Job) -> Result<(), Failure> {
         let plural = if ranks == 1 { "" } else { "s" };
         say(job, &format!("sph-run on {ranks} rank{plural}, {} particles", header.count));
         let command = launch::parallel(&programs.shell, &programs.path("sph-run"), ranks).arg(job.folder);
+        let command = match changes.is_empty() {
+            true => command,
+            false => command.arg("--scene").arg(job.scene),
+        };
         passed("sph-run", launch::wait_with(command, Stop::Gently, job.log)?, job)?;
     }
     say(job, "sph-post");
@@ -150,22 +164,27 @@ fn is_occupied(folder: &Path) -> bool {
     folder.exists() && std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_some())
 }
 
-/// A run folder is gone on with only if it was made from the same scene, to the byte.
-fn same_scene(folder: &RunFolder, job: &Job) -> Result<(), Failure> {
+/// What has changed in the scene since the run folder was made from it: a run is gone on with only where all of it may
+/// change meanwhile.
+fn changes(folder: &RunFolder, job: &Job) -> Result<Vec<Change>, Failure> {
     let name = paths::short(job.folder).display();
-    let (then, now) = (std::fs::read(folder.scene()), std::fs::read(job.scene));
+    let (then, now) = (std::fs::read_to_string(folder.scene()), std::fs::read_to_string(job.scene));
     let reason = match (then, now) {
-        (Ok(then), Ok(now)) if then == now && folder.initial().is_file() => return Ok(()),
-        (Ok(then), Ok(now)) if then == now => "holds a preparation that did not finish",
-        (Ok(_), Ok(_)) => "was made from another scene",
-        (Err(_), _) => "is not a run folder (it has no scene.lock.toml)",
-        (_, Err(_)) => "cannot be compared with the scene, which cannot be read",
+        (Ok(_), Ok(_)) if !folder.initial().is_file() => "holds a preparation that did not finish".to_owned(),
+        (Ok(then), Ok(now)) if then == now => return Ok(Vec::new()),
+        (Ok(then), Ok(now)) => match Scene::changes(&paths::short(job.scene).display().to_string(), &then, &now) {
+            Ok(changes) => return Ok(changes),
+            Err(error) => format!("cannot go on with the scene as it is now:\n{error}\n"),
+        },
+        (Err(_), _) => "is not a run folder (it has no scene.lock.toml)".to_owned(),
+        (_, Err(_)) => "cannot be compared with the scene, which cannot be read".to_owned(),
     };
     let advice = match folder.scene().is_file() {
         true => format!("start over with: {} --fresh; or choose another folder with --out", job.again),
         false => "choose another folder with --out".to_owned(),
     };
-    Err(Failure::cannot_write(format!("{name} {reason}; {advice}")))
+    let link = if reason.ends_with('\n') { "" } else { "; " };
+    Err(Failure::cannot_write(format!("{name} {reason}{link}{advice}")))
 }
 
 /// Removes an earlier run, and nothing that doesn't look like one.
@@ -215,33 +234,60 @@ mod tests {
         Job { scene, folder, ranks: None, fresh: false, again: "./talus case x", log: None }
     }
 
+    /// The scene of a case.
+    fn scene() -> String {
+        std::fs::read_to_string(paths::repository().join("workflows/cases/chute-mu-i/scene.toml")).unwrap()
+    }
+
     #[test]
     fn a_folder_of_another_scene_is_not_touched() {
         let work = tempfile::tempdir().unwrap();
-        let (scene, folder) = (work.path().join("scene.toml"), work.path().join("run"));
-        std::fs::write(&scene, "spacing = 1").unwrap();
+        let (file, folder) = (work.path().join("scene.toml"), work.path().join("run"));
+        std::fs::write(&file, scene()).unwrap();
         std::fs::create_dir(&folder).unwrap();
         let run = RunFolder::new(&folder);
         std::fs::write(folder.join("thesis.txt"), "years").unwrap();
-        let refused = |text: &str| {
-            let failure = same_scene(&run, &job(&scene, &folder)).unwrap_err();
+        let refused = |words: &[&str]| {
+            let failure = changes(&run, &job(&file, &folder)).unwrap_err();
             assert_eq!(failure.code, exit::CANNOT_WRITE);
-            assert!(failure.message.contains(text), "{failure}");
+            assert!(words.iter().all(|word| failure.message.contains(word)), "{failure}");
         };
-        refused("not a run folder");
+        refused(&["not a run folder"]);
         assert_eq!(remove(&run).unwrap_err().code, exit::CANNOT_WRITE);
         assert!(folder.join("thesis.txt").is_file());
-        std::fs::write(run.scene(), "spacing = 2").unwrap();
-        refused("another scene");
-        std::fs::write(run.scene(), "spacing = 1").unwrap();
-        refused("did not finish");
+        std::fs::write(run.scene(), scene()).unwrap();
+        refused(&["did not finish", "; start over with: ./talus case x --fresh"]);
         std::fs::write(run.initial(), "").unwrap();
-        same_scene(&run, &job(&scene, &folder)).unwrap();
+        assert_eq!(changes(&run, &job(&file, &folder)).unwrap(), []);
+        let other = scene().replace("shifting = 0.1", "shifting = 0.2").replace("grain-density", "# grain-density");
+        std::fs::write(run.scene(), other).unwrap();
+        refused(&[
+            "numerics.shifting: 0.1 now, 0.2 when",
+            "material.mu-i.grain-density: ",
+            "may not change\nstart over",
+        ]);
+        std::fs::write(&file, "spacing = ").unwrap();
+        refused(&["not valid TOML"]);
         std::fs::write(run.lock(), "").unwrap();
         assert_eq!(remove(&run).unwrap_err().code, exit::LOCKED);
         std::fs::remove_file(run.lock()).unwrap();
         remove(&run).unwrap();
         assert!(!folder.exists());
+    }
+
+    #[test]
+    fn a_scene_that_may_change_is_handed_on() {
+        let work = tempfile::tempdir().unwrap();
+        let (file, folder) = (work.path().join("scene.toml"), work.path().join("run"));
+        std::fs::create_dir(&folder).unwrap();
+        let run = RunFolder::new(&folder);
+        std::fs::write(run.scene(), scene()).unwrap();
+        std::fs::write(run.initial(), "").unwrap();
+        std::fs::write(&file, format!("# looked at again\n{}", scene())).unwrap();
+        assert_eq!(changes(&run, &job(&file, &folder)).unwrap(), []);
+        std::fs::write(&file, scene().replace("[end]\n", "[end]\nat-rest = 0.01\n")).unwrap();
+        let changes = changes(&run, &job(&file, &folder)).unwrap();
+        assert_eq!(changes.iter().map(Change::to_string).collect::<Vec<_>>(), ["end.at-rest: 0.01, was not set"]);
     }
 
     #[test]

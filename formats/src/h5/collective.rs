@@ -1,10 +1,10 @@
-//! Transfers of consecutive rows, by all ranks together or by one alone.
+//! Reading of consecutive rows, by all ranks together or by one alone.
 //!
-//! `hdf5-metno` transfers with default properties only, which under MPI means each rank on its own. These functions
-//! ask for collective transfers, in which MPI-IO gathers the ranks' rows into few large writes.
+//! `hdf5-metno` transfers with default properties only, which under MPI means each rank on its own. This asks for
+//! collective transfers, in which MPI-IO reads few large pieces and hands each rank its rows.
 
 use hdf5::{Dataset, Datatype, H5Type};
-use hdf5_sys::h5d::{H5Dread, H5Dwrite};
+use hdf5_sys::h5d::H5Dread;
 use hdf5_sys::h5i::hid_t;
 use hdf5_sys::h5p::{H5FD_mpio_xfer_t, H5Pclose, H5Pcreate, H5Pset_dxpl_mpio};
 use hdf5_sys::h5s::{
@@ -20,22 +20,8 @@ pub(crate) enum Transfer {
     Together,
 }
 
-/// Writes `values` as the rows from `first` on. A rank with no values takes part with an empty selection, and so does
+/// Fills `values` with the rows from `first` on. A rank with no values takes part with an empty selection, and so does
 /// one whose values do not fit, which then returns the error.
-pub(crate) fn write_rows<T: H5Type>(
-    dataset: &Dataset,
-    first: u64,
-    values: &[T],
-    transfer: Transfer,
-) -> hdf5::Result<()> {
-    with_selection::<T>(dataset, first, values.len(), transfer, |data, memory, file, kind, properties| {
-        // SAFETY: the ids are open, and the memory space selects exactly `values.len()` numbers of the type that
-        // `kind` was made from (none where the selection is empty).
-        unsafe { H5Dwrite(data, kind, memory, file, properties, values.as_ptr().cast()) }
-    })
-}
-
-/// Fills `values` with the rows from `first` on; as [`write_rows`].
 pub(crate) fn read_rows<T: H5Type>(
     dataset: &Dataset,
     first: u64,
@@ -44,7 +30,8 @@ pub(crate) fn read_rows<T: H5Type>(
 ) -> hdf5::Result<()> {
     let length = values.len();
     with_selection::<T>(dataset, first, length, transfer, |data, memory, file, kind, properties| {
-        // SAFETY: as in `write_rows`; `values` is borrowed mutably, and every bit pattern is a number.
+        // SAFETY: the ids are open, and the memory space selects exactly `values.len()` numbers of the type that
+        // `kind` was made from (none where the selection is empty); every bit pattern is a number.
         unsafe { H5Dread(data, kind, memory, file, properties, values.as_mut_ptr().cast()) }
     })
 }

@@ -69,12 +69,11 @@ pub(crate) fn broadcast(comm: &Communicator, root: i32, mut bytes: Vec<u8>) -> V
     bytes
 }
 
-/// Collective: makes (and empties) the file at `path` for writing by all ranks.
-pub(crate) fn create(path: &Path, comm: &Communicator) -> hdf5::Result<hdf5::File> {
-    let communicator = comm.as_raw();
+/// Makes (and empties) the file at `path`, for this process alone.
+pub(crate) fn create(path: &Path) -> hdf5::Result<hdf5::File> {
     hdf5::File::with_options()
         // From 1.8 on, metadata carry checksums: HDF5 itself notices a flipped bit in them.
-        .with_fapl(|access| access.mpio(communicator, None).libver_v18())
+        .with_fapl(|access| access.libver_v18())
         // No times in the file: equal contents give equal bytes.
         .with_fcpl(|creation| creation.obj_track_times(false))
         .create(path)

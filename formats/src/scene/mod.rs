@@ -2,6 +2,7 @@
 //!
 //! [`Scene::read`] goes from text to a checked scene, or to the list of all its faults, each with line and column.
 
+mod changes;
 mod check;
 mod error;
 mod fit;
@@ -17,6 +18,7 @@ mod periodic_axis;
 mod raw;
 mod walls;
 
+pub use changes::{Change, MAY_CHANGE};
 pub use error::{Fault, SceneError};
 pub use periodic_axis::PeriodicAxis;
 pub use walls::{Parity, Site, WallLattice};
@@ -386,10 +388,5 @@ impl Scene {
     /// Smoothing length h, m.
     pub fn h(&self) -> f64 {
         self.h_over_dx * self.spacing
-    }
-
-    /// SHA-256 of the text, as stored in every file the scene leads to.
-    pub fn hash(text: &str) -> String {
-        crate::provenance::sha256(text.as_bytes())
     }
 }

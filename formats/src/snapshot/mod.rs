@@ -9,12 +9,14 @@
 //! | `/particles/<field>` | one contiguous dataset a row of [`schema::FIELDS`], `count` rows; attributes `units`, `description` |
 //! | `/VTKHDF` | an unstructured grid of one vertex a particle; `Points` and `PointData/*` are links to `/particles/*` |
 
+mod digest;
 mod error;
 mod read;
 mod write;
 
+pub use digest::Digests;
 pub use error::FileError;
-pub use read::{digest, read, read_header, read_rows};
+pub use read::{digest, digests, digests_of_shares, read, read_header, read_rows};
 pub use write::write;
 
 use crate::{kernel::Kernel, schema, schema::Field, schema::Kept, space::Space};

@@ -1,13 +1,13 @@
 //! Reading a particle file, alone or by all ranks together, and naming its contents.
 
-use super::{Column, ColumnMut, FORMAT_VERSION, FileError, Header, Rows, content_name, fields_of};
+use super::digest::Sums;
+use super::{ColumnMut, Digests, FORMAT_VERSION, FileError, Header, Rows, content_name, fields_of, share};
 use crate::h5::collective::{self, Transfer};
 use crate::h5::{self, Communicator, text};
-use crate::provenance::hex;
 use crate::schema::{Field, Kept, Rank};
 use crate::{kernel::Kernel, space::Space};
 use hdf5::{Dataset, Group};
-use sha2::{Digest, Sha256};
+use mpi::traits::Communicator as _;
 use std::cmp::Ordering;
 use std::io::Read;
 use std::{fs, ops::Range, path::Path};
@@ -67,31 +67,43 @@ pub fn read_rows(path: &Path, range: Range<u64>, comm: &Communicator) -> Result<
     Ok((header, rows))
 }
 
-/// SHA-256 over what a particle file says: the header, then each field's name and numbers in table order. Serial.
-/// Independent of the number of ranks that wrote it, of HDF5's version, and of the VTK view.
+/// The header and the digest of each field. Serial.
 ///
 /// # Errors
 /// As [`read_header`]. Values are not judged.
-pub fn digest(path: &Path) -> Result<String, FileError> {
+pub fn digests(path: &Path) -> Result<(Header, Digests), FileError> {
     let open = open(path)?;
-    let mut hash = Sha256::new();
-    hash.update(open.header.bytes());
-    for (field, dataset) in &open.fields {
-        hash.update(field.name);
-        let mut first = 0;
-        while first < open.header.count {
-            let end = open.header.count.min(first + PASS);
-            let mut rows = Rows { first, ..Rows::default() };
-            read_column(&mut rows, field, dataset, first..end, Transfer::Alone)
-                .map_err(|error| FileError::damaged(path, error))?;
-            match rows.column(field) {
-                Column::Whole(values) => values.iter().for_each(|value| hash.update(value.to_le_bytes())),
-                Column::Real(values) => values.iter().for_each(|value| hash.update(value.to_le_bytes())),
-            }
-            first = end;
-        }
+    let mut sums = Sums::new(open.kept);
+    let mut first = 0;
+    while first < open.header.count {
+        let end = open.header.count.min(first + PASS);
+        sums.add(&open.rows(path, first..end, Transfer::Alone)?);
+        first = end;
     }
-    Ok(hex(&hash.finalize()))
+    Ok((open.header, sums.finish()))
+}
+
+/// One digest for a whole particle file: its header and its numbers. Serial.
+/// Independent of the number of ranks that wrote it, of HDF5's version, and of the VTK view.
+///
+/// # Errors
+/// As [`digests`].
+pub fn digest(path: &Path) -> Result<String, FileError> {
+    let (header, digests) = digests(path)?;
+    Ok(digests.of_file(&header))
+}
+
+/// Collective: the header and the digests of a whole file, of which every rank reads the share of the rank after it,
+/// so that nobody is asked for what it wrote itself.
+///
+/// # Errors
+/// As [`read_rows`].
+pub fn digests_of_shares(path: &Path, count: u64, comm: &Communicator) -> Result<(Header, Digests), FileError> {
+    let (rank, size) = (comm.rank() as u64, comm.size() as u64);
+    let (header, rows) = read_rows(path, share(count, (rank + 1) % size, size), comm)?;
+    let mut sums = Sums::new(Kept::Checkpoint);
+    sums.add(&rows);
+    Ok((header, sums.finish_together(comm)))
 }
 
 fn check(path: &Path, rows: &Rows, kept: Kept) -> Result<(), FileError> {

@@ -1,20 +1,38 @@
 //! Writing a particle file, by all ranks together.
+//!
+//! ```text
+//! rank 0      makes the file alone: groups, attributes, and contiguous datasets whose places are fixed once it is closed
+//! rank 0      has the system allocate every byte of it (a full disk is found out here)
+//! every rank  writes its rows at their places, and waits until they are on the disk
+//! rank 0      renames the file
+//! ```
+//!
+//! No call into HDF5 is collective. HDF5 over MPI-IO reports success on a full or failing disk and hangs in closing the
+//! file, because one rank gives up while the others wait inside the library; here each rank's error is its own, and
+//! `agree` tells it to all.
 
-use super::{Column, FORMAT_VERSION, FileError, Header, Rows, content_name, fields_of};
+use super::digest::Sums;
+use super::{Column, Digests, FORMAT_VERSION, FileError, Header, Rows, content_name, fields_of};
 use crate::disk;
-use crate::h5::collective::{Transfer, write_rows};
 use crate::h5::{self, Communicator, text};
-use crate::schema::{self, Field, Kept};
+use crate::schema::{self, Kept};
 use hdf5::plist::dataset_create::{AllocTime, FillTime};
 use hdf5::{Dataset, Group, H5Type};
 use mpi::traits::{Communicator as _, CommunicatorCollectives};
-use std::{fs, path::Path};
+use std::fs::{self, File};
+use std::io;
+use std::os::unix::fs::FileExt;
+use std::path::Path;
 
 /// Room for everything in the file that is not numbers of particles.
 const METADATA_BYTES: u64 = 64 << 10;
 
+/// Bytes handed to the system at once.
+const PIECE: usize = 4 << 20;
+
 /// Collective: writes a particle file, each rank its rows; together they must be the rows 0 to `header.count`, in any
-/// order over the ranks, and some ranks may have none. The header must be the same on all ranks.
+/// order over the ranks, and some ranks may have none. The header must be the same on all ranks. Returns the digests
+/// of what was to be written, the same on all ranks.
 ///
 /// The file is written beside its place and renamed once it is whole and on the disk, so a failure leaves an older
 /// file at `path` as it was. `kept` says which fields go in: `Everywhere` for a snapshot, `Checkpoint` for all.
@@ -22,25 +40,25 @@ const METADATA_BYTES: u64 = 64 << 10;
 ///
 /// # Errors
 /// The same on all ranks. `CannotWrite` if the rows or headers don't fit together, a number is not finite, or the
-/// system refuses; `DiskFull`, found out before the first number is written.
-pub fn write(path: &Path, header: &Header, rows: &Rows, kept: Kept, comm: &Communicator) -> Result<(), FileError> {
+/// system refuses; `DiskFull`, found out before the first number is written where the file system can tell.
+pub fn write(path: &Path, header: &Header, rows: &Rows, kept: Kept, comm: &Communicator) -> Result<Digests, FileError> {
     let refuse = |what: String| FileError::cannot_write(path, what);
     h5::agree(comm, rows.fault(kept).map_or(Ok(()), |what| Err(refuse(what))))?;
     check_tiling(header, rows, comm).map_err(refuse)?;
     check_same(path, header, kept, comm).map_err(refuse)?;
 
     let root = comm.rank() == 0;
-    let needed = bytes_needed(header.count, kept);
     let temporary = disk::temporary(path);
-    h5::agree(comm, if root { disk::reserve(&temporary, needed) } else { Ok(()) })?;
-    let outcome = write_all(&temporary, header, rows, kept, comm).and_then(|()| {
-        let publish = || disk::sync_file(&temporary).and_then(|()| disk::publish(&temporary, path));
-        h5::agree(comm, if root { publish() } else { Ok(()) })
-    });
+    let outcome = h5::from_root(comm, || make(&temporary, header, kept))
+        .and_then(|places| h5::agree(comm, write_rows(&temporary, header, &places, rows, kept)))
+        .and_then(|()| h5::agree(comm, if root { disk::publish(&temporary, path) } else { Ok(()) }));
     if outcome.is_err() && root {
         let _ = fs::remove_file(&temporary);
     }
-    outcome
+    outcome?;
+    let mut sums = Sums::new(kept);
+    sums.add(rows);
+    Ok(sums.finish_together(comm))
 }
 
 /// Bytes of a file with `count` particles, at most.
@@ -83,32 +101,26 @@ fn check_same(path: &Path, header: &Header, kept: Kept, comm: &Communicator) -> 
     if all { Ok(()) } else { Err("the ranks disagree on the header or the path".into()) }
 }
 
-/// Collective: makes the file at `temporary` with all its contents, and closes it.
-fn write_all(temporary: &Path, header: &Header, rows: &Rows, kept: Kept, comm: &Communicator) -> Result<(), FileError> {
-    let root = comm.rank() == 0;
+/// Where the datasets begin in the file.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+struct Places {
+    /// In the order of the fields.
+    fields: Vec<u64>,
+    connectivity: u64,
+    offsets: u64,
+    types: u64,
+}
+
+/// Rank 0: makes the file with everything in it but the rows, and has room made for those.
+fn make(temporary: &Path, header: &Header, kept: Kept) -> Result<Places, FileError> {
     let needed = bytes_needed(header.count, kept);
-    let step = |result: hdf5::Result<()>| h5::agree(comm, result.map_err(|error| refused(temporary, needed, &error)));
-
-    let file = h5::create(temporary, comm).map_err(|error| refused(temporary, needed, &error));
-    let file = h5::agree(comm, file)?;
-    let layout = Layout::make(&file, header, kept).map_err(|error| refused(temporary, needed, &error));
-    let layout = h5::agree(comm, layout)?;
-    // The guard against a full disk: HDF5 would report success, and hang in closing. Contiguous datasets have their
-    // place once they are made, so after a flush the file has its final length.
-    step(file.flush())?;
-    h5::agree(comm, if root { disk::allocate(temporary) } else { Ok(()) })?;
-
-    for (field, dataset) in &layout.fields {
-        step(match rows.column(field) {
-            Column::Whole(values) => write_rows(dataset, rows.first, values, Transfer::Together),
-            Column::Real(values) => write_rows(dataset, rows.first, values, Transfer::Together),
-        })?;
-    }
-    layout.write_vtk(header.count, rows, root, step)?;
-    // A flush under MPI is an fsync on every rank's machine.
-    step(file.flush())?;
-    drop(layout);
-    step(file.close())
+    disk::reserve(temporary, needed)?;
+    let refused = |error: hdf5::Error| refused(temporary, needed, &error);
+    let file = h5::create(temporary).map_err(refused)?;
+    let places = lay_out(&file, header, kept).map_err(refused)?;
+    file.close().map_err(refused)?;
+    disk::allocate(temporary)?;
+    Ok(places)
 }
 
 fn refused(path: &Path, needed: u64, error: &hdf5::Error) -> FileError {
@@ -120,94 +132,57 @@ fn refused(path: &Path, needed: u64, error: &hdf5::Error) -> FileError {
     }
 }
 
-/// The datasets of a new file.
-struct Layout {
-    fields: Vec<(&'static Field, Dataset)>,
-    /// `NumberOfPoints`, `NumberOfCells`, `NumberOfConnectivityIds`, one number each.
-    numbers: Vec<Dataset>,
-    connectivity: Dataset,
-    offsets: Dataset,
-    types: Dataset,
-}
+fn lay_out(file: &hdf5::File, header: &Header, kept: Kept) -> hdf5::Result<Places> {
+    let count = header.count as usize;
+    let group = |name: &str| file.create_group_builder().obj_track_times(false).create(name);
 
-impl Layout {
-    /// Collective, the same calls with the same values on all ranks.
-    fn make(file: &hdf5::File, header: &Header, kept: Kept) -> hdf5::Result<Self> {
-        let count = header.count as usize;
-        let group = |name: &str| file.create_group_builder().obj_track_times(false).create(name);
-
-        let sph = group("sph")?;
-        sph.new_attr::<u64>().create("format_version")?.write_scalar(&FORMAT_VERSION)?;
-        text::write(&sph, "content", content_name(kept))?;
-        text::write(&sph, "title", &header.title)?;
-        text::write(&sph, "scene_hash", &header.scene_hash)?;
-        text::write(&sph, "space", header.space.name())?;
-        text::write(&sph, "kernel", header.kernel.name())?;
-        for (name, value) in [("spacing", header.spacing), ("h", header.h), ("time", header.time)] {
-            sph.new_attr::<f64>().create(name)?.write_scalar(&value)?;
-        }
-        sph.new_attr_builder().with_data(&header.gravity).create("gravity")?;
-        for (name, value) in [("step", header.step), ("count", header.count)] {
-            sph.new_attr::<u64>().create(name)?.write_scalar(&value)?;
-        }
-
-        let particles = group("particles")?;
-        let mut fields = Vec::new();
-        for field in fields_of(kept) {
-            let shape = match field.rank.components() {
-                1 => vec![count],
-                components => vec![count, components],
-            };
-            let dataset = match field.rank {
-                schema::Rank::Whole => contiguous::<u64>(&particles, field.name, shape)?,
-                _ => contiguous::<f64>(&particles, field.name, shape)?,
-            };
-            text::write(&dataset, "units", field.unit)?;
-            text::write(&dataset, "description", field.description)?;
-            fields.push((field, dataset));
-        }
-
-        // What VTK asks for: 1-D counts, signed offsets, one vertex cell (type 1) a particle, one piece.
-        let vtk = group("VTKHDF")?;
-        vtk.new_attr_builder().with_data(&[1i64, 0]).create("Version")?;
-        text::write(&vtk, "Type", "UnstructuredGrid")?;
-        let mut numbers = Vec::new();
-        for name in ["NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"] {
-            numbers.push(contiguous::<i64>(&vtk, name, vec![1])?);
-        }
-        let connectivity = contiguous::<i64>(&vtk, "Connectivity", vec![count])?;
-        let offsets = contiguous::<i64>(&vtk, "Offsets", vec![count + 1])?;
-        let types = contiguous::<u8>(&vtk, "Types", vec![count])?;
-        file.link_hard("/particles/position", "/VTKHDF/Points")?;
-        let _point_data = group("VTKHDF/PointData")?;
-        for field in fields_of(Kept::Everywhere).filter(|field| field.name != schema::POSITION.name) {
-            file.link_hard(&format!("/particles/{}", field.name), &format!("/VTKHDF/PointData/{}", field.name))?;
-        }
-        Ok(Self { fields, numbers, connectivity, offsets, types })
+    let sph = group("sph")?;
+    sph.new_attr::<u64>().create("format_version")?.write_scalar(&FORMAT_VERSION)?;
+    text::write(&sph, "content", content_name(kept))?;
+    text::write(&sph, "title", &header.title)?;
+    text::write(&sph, "scene_hash", &header.scene_hash)?;
+    text::write(&sph, "space", header.space.name())?;
+    text::write(&sph, "kernel", header.kernel.name())?;
+    for (name, value) in [("spacing", header.spacing), ("h", header.h), ("time", header.time)] {
+        sph.new_attr::<f64>().create(name)?.write_scalar(&value)?;
+    }
+    sph.new_attr_builder().with_data(&header.gravity).create("gravity")?;
+    for (name, value) in [("step", header.step), ("count", header.count)] {
+        sph.new_attr::<u64>().create(name)?.write_scalar(&value)?;
     }
 
-    /// Collective: fills the VTK view's own datasets. `step` agrees on the outcome of each transfer.
-    fn write_vtk<F>(&self, count: u64, rows: &Rows, root: bool, step: F) -> Result<(), FileError>
-    where
-        F: Fn(hdf5::Result<()>) -> Result<(), FileError>,
-    {
-        let number = if root { vec![count as i64] } else { Vec::new() };
-        for dataset in &self.numbers {
-            step(write_rows(dataset, 0, &number, Transfer::Together))?;
-        }
-        let first = rows.first as i64;
-        let end = first + rows.len() as i64;
-        let vertices: Vec<i64> = (first..end).collect();
-        step(write_rows(&self.connectivity, rows.first, &vertices, Transfer::Together))?;
-        // Offsets has one entry more: whoever has row i writes entry i + 1, and the first also entry 0.
-        let (start, offsets): (i64, Vec<i64>) = match (rows.is_empty(), first) {
-            (true, _) => (0, Vec::new()),
-            (false, 0) => (0, (0..=end).collect()),
-            (false, _) => (first + 1, (first + 1..=end).collect()),
+    let particles = group("particles")?;
+    let mut fields = Vec::new();
+    for field in fields_of(kept) {
+        let shape = match field.rank.components() {
+            1 => vec![count],
+            components => vec![count, components],
         };
-        step(write_rows(&self.offsets, start as u64, &offsets, Transfer::Together))?;
-        step(write_rows(&self.types, rows.first, &vec![1u8; rows.len()], Transfer::Together))
+        let dataset = match field.rank {
+            schema::Rank::Whole => contiguous::<u64>(&particles, field.name, shape)?,
+            _ => contiguous::<f64>(&particles, field.name, shape)?,
+        };
+        text::write(&dataset, "units", field.unit)?;
+        text::write(&dataset, "description", field.description)?;
+        fields.push(place(&dataset)?);
     }
+
+    // What VTK asks for: 1-D counts, signed offsets, one vertex cell (type 1) a particle, one piece.
+    let vtk = group("VTKHDF")?;
+    vtk.new_attr_builder().with_data(&[1i64, 0]).create("Version")?;
+    text::write(&vtk, "Type", "UnstructuredGrid")?;
+    for name in ["NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"] {
+        contiguous::<i64>(&vtk, name, vec![1])?.write_raw(&[count as i64])?;
+    }
+    let connectivity = place(&contiguous::<i64>(&vtk, "Connectivity", vec![count])?)?;
+    let offsets = place(&contiguous::<i64>(&vtk, "Offsets", vec![count + 1])?)?;
+    let types = place(&contiguous::<u8>(&vtk, "Types", vec![count])?)?;
+    file.link_hard("/particles/position", "/VTKHDF/Points")?;
+    let _point_data = group("VTKHDF/PointData")?;
+    for field in fields_of(Kept::Everywhere).filter(|field| field.name != schema::POSITION.name) {
+        file.link_hard(&format!("/particles/{}", field.name), &format!("/VTKHDF/PointData/{}", field.name))?;
+    }
+    Ok(Places { fields, connectivity, offsets, types })
 }
 
 /// A contiguous dataset whose place is reserved at once, not filled, and without times.
@@ -220,4 +195,53 @@ fn contiguous<T: H5Type>(group: &Group, name: &str, shape: Vec<usize>) -> hdf5::
         .obj_track_times(false)
         .shape(shape)
         .create(name)
+}
+
+fn place(dataset: &Dataset) -> hdf5::Result<u64> {
+    dataset.offset().ok_or_else(|| format!("{} has no place in the file", dataset.name()).into())
+}
+
+/// This rank's rows of all datasets, to the disk.
+fn write_rows(
+    temporary: &Path,
+    header: &Header,
+    places: &Places,
+    rows: &Rows,
+    kept: Kept,
+) -> Result<(), FileError> {
+    let fault = |error: io::Error| FileError::writing(temporary, bytes_needed(header.count, kept), &error);
+    let file = File::options().write(true).open(temporary).map_err(fault)?;
+    let write = || {
+        let first = rows.first;
+        for (field, place) in fields_of(kept).zip(&places.fields) {
+            let place = place + 8 * field.rank.components() as u64 * first;
+            match rows.column(field) {
+                Column::Whole(values) => write_at(&file, place, values.iter().map(|value| value.to_ne_bytes()))?,
+                Column::Real(values) => write_at(&file, place, values.iter().map(|value| value.to_ne_bytes()))?,
+            }
+        }
+        let end = first + rows.len() as u64;
+        write_at(&file, places.connectivity + 8 * first, (first as i64..end as i64).map(i64::to_ne_bytes))?;
+        // Offsets has one entry more: whoever has row i writes entry i + 1, and the first also entry 0.
+        let start = if first == 0 { 0 } else { first + 1 };
+        let after = if rows.is_empty() { start } else { end + 1 };
+        write_at(&file, places.offsets + 8 * start, (start as i64..after as i64).map(i64::to_ne_bytes))?;
+        write_at(&file, places.types + first, (first..end).map(|_| [1u8]))?;
+        file.sync_all()
+    };
+    write().map_err(fault)
+}
+
+/// Writes small groups of bytes one after the other from `place` on.
+fn write_at<const N: usize>(file: &File, mut place: u64, values: impl Iterator<Item = [u8; N]>) -> io::Result<()> {
+    let mut piece = Vec::with_capacity(PIECE.min(values.size_hint().0 * N));
+    for value in values {
+        piece.extend(value);
+        if piece.len() >= PIECE {
+            file.write_all_at(&piece, place)?;
+            place += piece.len() as u64;
+            piece.clear();
+        }
+    }
+    file.write_all_at(&piece, place)
 }

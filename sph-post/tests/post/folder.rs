@@ -116,7 +116,7 @@ impl Made {
     pub fn new(text: &'static str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let run = RunFolder::new(folder.path().join("run"));
-        std::fs::create_dir_all(run.out()).unwrap();
+        std::fs::create_dir_all(run.history_pieces()).unwrap();
         std::fs::write(run.scene(), text).unwrap();
         let scene = Scene::read("scene", text).unwrap();
         Self { run, scene, text, _folder: folder }
@@ -146,6 +146,21 @@ impl Made {
 
     pub fn snapshot(&self, number: u64, time: f64, step: u64, rows: &Rows) {
         self.write(&self.run.snapshot(number), time, step, rows);
+        self.segment(time, step, "", Some((number, snapshot::digest(&self.run.snapshot(number)).unwrap())));
+    }
+
+    /// All lines of the history, with the names of its columns.
+    pub fn history(&self, text: &str) {
+        self.segment(f64::MAX, 0, text, None);
+    }
+
+    /// One segment more, in place of an earlier one with that snapshot, or without any.
+    fn segment(&self, time: f64, step: u64, text: &str, snapshot: Option<(u64, String)>) {
+        let mut index = Index::read(&self.run).unwrap().unwrap_or_default();
+        let number = snapshot.as_ref().map_or(index.segments.len() as u64, |(number, _)| *number);
+        index.segments.retain(|segment| segment.number != number && (snapshot.is_some() || segment.snapshot.is_some()));
+        index.segments.push(Segment::write(&self.run, (number, step, time), "", text, snapshot).unwrap());
+        index.write(&self.run).unwrap();
     }
 }
 
@@ -210,7 +225,7 @@ pub fn spreading(made: &Made) {
         let (stress, viscous) = (0.9 * lost, 0.1 * lost);
         let _ = writeln!(text, "{:e},{k},{kinetic:e},{potential:e},{:e},{stress:e},{viscous:e}", s * end, 1e-4);
     }
-    std::fs::write(made.run.history(), text).unwrap();
+    made.history(&text);
 }
 
 /// The column on its way (0 to 1) to a cone: a frustum of the same volume.

@@ -215,7 +215,7 @@ fn histories_of_older_runs_are_read_too() {
     let made = Made::new(SCENES[0].text);
     made.initial(&block(&made.scene));
     let text = "time [s],step [1],kinetic_energy [J],potential_energy [J],elastic_energy [J]\n0,0,0,2,0\n1,9,1,0.5,0\n";
-    std::fs::write(made.run.history(), text).unwrap();
+    made.history(text);
     let called = post(made.run.path(), &["--quiet"]);
     assert_eq!((called.code, called.err.as_str()), (Some(exit::DONE), ""));
     let summary: serde_json::Value =
@@ -254,9 +254,11 @@ fn wrong_folders_and_files_are_refused_with_one_message() {
     made.snapshot(1, 0.0, 10, &rows);
     refused(made.run.path(), exit::NO_INPUT, "does not come after");
     std::fs::write(&second, &whole).unwrap();
-    std::fs::write(made.run.history(), "time [s],a [1]\n1,2\n1,x\n").unwrap();
+    made.history("time [s],a [1]\n1,2\n1,x\n");
     refused(made.run.path(), exit::NO_INPUT, "line 3");
-    std::fs::remove_file(made.run.history()).unwrap();
+    std::fs::write(made.run.history_piece(2), "time [s],a [1]\n1,2\n1,3\n").unwrap();
+    refused(made.run.path(), exit::NO_INPUT, "000002.csv");
+    made.history("time [s],a [1]\n1,2\n2,3\n");
     std::fs::write(made.run.scene(), SCENES[0].text.replace("30 deg", "31 deg")).unwrap();
     refused(made.run.path(), exit::NO_INPUT, "another scene");
     std::fs::write(made.run.scene(), "space = 3").unwrap();

@@ -44,7 +44,7 @@ pub fn path(study: &Study) -> PathBuf {
 
 /// Beginning of the hash of a run's scene as it is now.
 pub fn hash(run: &Run) -> String {
-    formats::scene::Scene::hash(&run.scene).chars().take(HASH_DIGITS).collect()
+    formats::scene::Scene::text_hash(&run.scene).chars().take(HASH_DIGITS).collect()
 }
 
 impl Results {

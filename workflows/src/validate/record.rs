@@ -24,7 +24,7 @@ pub struct Record {
     pub sources: Sources,
     /// The day it began, UTC: `2026-01-31`.
     pub date: String,
-    /// Hash of the scene file, as [`Scene::hash`] has it.
+    /// Hash of the scene file, as [`Scene::text_hash`] has it.
     pub scene: String,
     /// MPI ranks.
     pub ranks: u32,
@@ -77,7 +77,7 @@ impl std::fmt::Display for Sources {
 impl Record {
     /// Of a run that begins now.
     pub fn begun(sources: &Sources, scene: &str, ranks: u32) -> Self {
-        Self { sources: sources.clone(), date: today(), scene: Scene::hash(scene), ranks, seconds: None }
+        Self { sources: sources.clone(), date: today(), scene: Scene::text_hash(scene), ranks, seconds: None }
     }
 
     /// Puts it in the run folder.
@@ -99,7 +99,7 @@ pub fn earlier(folder: &Path, scene: &str, sources: &Sources) -> Earlier {
     };
     let run = RunFolder::new(folder);
     let prepared = std::fs::read_to_string(run.scene()).unwrap_or_default();
-    if record.scene != Scene::hash(scene) || prepared != scene {
+    if record.scene != Scene::text_hash(scene) || prepared != scene {
         Earlier::Useless("its scene is another one by now")
     } else if run.done().is_file() {
         Earlier::Done(record)

@@ -158,7 +158,7 @@ mod tests {
         };
         let verdicts = [verdict(Some(false), "±15 %"), verdict(None, "–")];
         let text = section(&validation, &verdicts, &[("c", shown, &run)], "Evaluated by x, today.");
-        let hash = &formats::scene::Scene::hash("spacing = 1")[..8];
+        let hash = &formats::scene::Scene::text_hash("spacing = 1")[..8];
         for line in [
             "Title. Evaluated by x, today.",
             "| c | m | 1.200 | 1.000 | +20.0 % | ±15 % | **no** | s |",
