@@ -1,11 +1,13 @@
 //! Starts the stages of a run in order. `./talus` at the root of the repository hands its words to this program.
 
+mod batch;
 mod cases;
 mod failure;
 mod gate;
 mod launch;
 mod paths;
 mod stage;
+mod status;
 mod study;
 mod validate;
 
@@ -40,6 +42,22 @@ enum Command {
     },
     /// List the cases.
     Cases,
+    /// Run a case or a scene in slices: as jobs of Slurm, or as wall time on this machine (--local).
+    Batch {
+        /// Name of a case, path of a scene file that ends in .toml, or a run folder to go on with.
+        name: String,
+        #[command(flatten)]
+        options: Box<batch::Options>,
+    },
+    /// Say how far runs are: what is done, how much is left, when it ends.
+    Status {
+        /// Run folders.
+        #[arg(required = true, value_name = "RUN")]
+        runs: Vec<PathBuf>,
+        /// As a JSON array, for scripts.
+        #[arg(long)]
+        json: bool,
+    },
     /// Run the validation cases and hold them against published numbers; writes tests/validation/RESULTS.md.
     Validate {
         /// Folders under tests/validation; all where none is named.
@@ -100,6 +118,8 @@ fn carry_out(command: Command) -> Result<(), Failure> {
             run(&case, out.as_deref(), folder, how, &again)
         }
         Command::Cases => cases::list(),
+        Command::Batch { name, options } => batch::carry_out(&name, &options),
+        Command::Status { runs, json } => status::tell(&runs, json),
         Command::Validate { names, ranks, reuse } => validate::all(&names, ranks, reuse),
         Command::Study { name: None, .. } => study::list(),
         Command::Study { name: Some(name), options } => study::carry_out(&name, &options),

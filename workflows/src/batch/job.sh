@@ -67,30 +67,38 @@ give_up() {
 # What CONTINUE says of a key; nothing where there is no such file.
 told() { sed -n "s/.*\"$1\": *\"\{0,1\}\([^\",}]*\).*/\1/p" CONTINUE 2>/dev/null; }
 
+# Does Slurm itself put a job with code 75 back into the queue? It does so even with --no-requeue.
+slurm_requeues() {
+    [ -n "${SLURM_JOB_ID:-}" ] || return 1
+    case ",$(scontrol show config | sed -n 's/^RequeueExit *= *//p')," in
+    *,75,*) return 0 ;;
+    esac
+    return 1
+}
+
 # Ends this slice in such a way that another one follows.
 next_slice() {
+    stopped=75
     case $(told reason) in
-    stop-file | steps)
-        # A person's wish. Code 75 would put the job back where Slurm is set up so.
-        give_up 0 "stopped on request; submit this script again to go on"
+    stop-file | steps) # a person's wish
+        ! slurm_requeues || stopped=0
+        give_up "$stopped" "stopped on request; submit this script again to go on"
         ;;
     esac
-    if [ "$(told step)" = "$before" ]; then
+    if [ "$(told step)" = "$step_before" ]; then
         stands=$(($(cat log/standstill 2>/dev/null || echo 0) + 1))
         echo "$stands" >log/standstill
         [ "$stands" -lt 3 ] || give_up 70 "three slices in a row brought nothing: too short?"
     else
         rm -f log/standstill
     fi
-    if [ "$go_on" = requeue ] && [ -n "${SLURM_JOB_ID:-}" ]; then
-        # Slurm puts a job with one of the codes RequeueExit back by itself.
-        case ",$(scontrol show config | sed -n 's/^RequeueExit *= *//p')," in
-        *,75,*) ;;
-        *) scontrol requeue "$SLURM_JOB_ID" || say "cannot put the job back; submit this script again to go on" ;;
-        esac
+    say "stopped at t = $(told time) s, step $(told step); the next slice goes on"
+    if [ "$go_on" = chain ]; then
+        ! slurm_requeues || stopped=0
+    elif [ -n "${SLURM_JOB_ID:-}" ] && ! slurm_requeues; then
+        scontrol requeue "$SLURM_JOB_ID" || say "cannot put the job back: submit this script again"
     fi
-    say "stopped at t = $(told time) s with a checkpoint; goes on in the next slice"
-    exit 75
+    exit "$stopped"
 }
 
 # may_go_on WHAT: after a failure with $status, returns where another slice may follow.
@@ -105,7 +113,7 @@ may_go_on() {
 
 cd "$run" || exit 73
 mkdir -p log || exit 73
-before=$(told step)
+step_before=$(told step)
 
 if [ ! -f scene.lock.toml ]; then
     if [ ! -f prepared/scene.lock.toml ]; then
@@ -119,14 +127,18 @@ if [ ! -f scene.lock.toml ]; then
     rm -rf prepared prepared.tmp-*
 fi
 
-if [ ! -f DONE ]; then
-    rm -f CONTINUE log/evaluated
-    run_to_end parallel "$programs/sph-run" "$run"@OPTIONS@
+# A scene that was changed since: sph-run takes up what may change, and refuses the rest.
+changed=''
+[ ! -f scene.toml ] || cmp -s scene.toml scene.lock.toml || changed=yes
+
+if [ ! -f DONE ] || [ -n "$changed" ]; then
+    rm -f CONTINUE
+    run_to_end parallel "$programs/sph-run" "$run" ${changed:+--scene scene.toml}@OPTIONS@
     [ "$status" = 0 ] || { may_go_on sph-run && next_slice; }
     [ -f DONE ] || give_up 70 "sph-run ended without DONE"
 fi
 
-if [ ! -f log/evaluated ]; then
+if [ -z "$(find log/evaluated -newer DONE 2>/dev/null)" ]; then
     run_to_end "$programs/sph-post" "$run"
     [ "$status" = 0 ] || { may_go_on sph-post && next_slice; }
     : >log/evaluated

@@ -4,7 +4,7 @@ mod local;
 mod script;
 mod slurm;
 
-use crate::{cases, cases::Case, failure::Failure, launch, paths, stage};
+use crate::{cases, cases::Case, failure::Failure, paths, stage};
 use formats::{disk, exit, folder::RunFolder, scene::Scene};
 use std::path::{Path, PathBuf};
 
@@ -71,7 +71,7 @@ pub fn carry_out(name: &str, options: &Options) -> Result<(), Failure> {
 fn target(name: &str, out: Option<&Path>) -> Result<(Case, PathBuf), Failure> {
     let there = paths::from_caller(Path::new(name));
     let folder = RunFolder::new(&there);
-    let scene = [folder.scene(), scene_of_job(&there)].into_iter().find(|path| path.is_file());
+    let scene = [scene_of_job(&there), folder.scene()].into_iter().find(|path| path.is_file());
     if let (true, Some(scene), None) = (there.is_dir(), scene, out) {
         let name = there.canonicalize().unwrap_or(there.clone());
         let name = name.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -119,19 +119,36 @@ fn queued(case: &Case, folder: &Path) -> Result<PathBuf, Failure> {
     let scene = Scene::read(&paths::short(&case.scene).display().to_string(), &text);
     scene.map_err(|faults| Failure { code: exit::USAGE, message: faults.to_string() })?;
     let cannot = |e: std::io::Error| Failure::cannot_write(format!("{}: cannot make it: {e}", folder.display()));
-    if stage::is_occupied(folder) {
-        let there = [RunFolder::new(folder).scene(), scene_of_job(folder)];
-        let shown = paths::short(folder).display();
-        let advice = "choose another folder with --out, or remove it first";
-        match there.iter().find_map(|path| std::fs::read_to_string(path).ok()) {
-            Some(then) if then == text => {}
-            Some(_) => return Err(Failure::cannot_write(format!("{shown} is of another scene; {advice}"))),
-            None => return Err(Failure::cannot_write(format!("{shown} is not a run folder; {advice}"))),
+    let write = || {
+        let written = disk::write_atomic(&scene_of_job(folder), text.as_bytes());
+        written.map_err(|e| Failure { code: e.exit_code(), message: e.to_string() })
+    };
+    let shown = paths::short(folder).display();
+    let advice = "choose another folder with --out, or remove this one";
+    match std::fs::read_to_string(RunFolder::new(folder).scene()) {
+        // The job itself compares: it hands what has changed to sph-run.
+        Ok(then) => match Scene::changes(&paths::short(&case.scene).display().to_string(), &then, &text) {
+            Ok(changes) if changes.is_empty() => drop(std::fs::remove_file(scene_of_job(folder))),
+            Ok(changes) => {
+                changes.iter().for_each(|change| eprintln!("talus: {shown}: the scene has changed: {change}"));
+                write()?;
+            }
+            Err(error) => {
+                let what = format!("{shown} cannot go on with the scene as it is now:\n{error}\n{advice}");
+                return Err(Failure::cannot_write(what));
+            }
+        },
+        // Nothing is prepared yet.
+        Err(_) if scene_of_job(folder).is_file() => write()?,
+        Err(_) if stage::is_occupied(folder) => {
+            return Err(Failure::cannot_write(format!(
+                "{shown} is not a run folder (it has no scene.lock.toml); {advice}"
+            )));
         }
-    } else {
-        std::fs::create_dir_all(folder).map_err(cannot)?;
-        disk::write_atomic(&scene_of_job(folder), text.as_bytes())
-            .map_err(|e| Failure { code: e.exit_code(), message: e.to_string() })?;
+        Err(_) => {
+            std::fs::create_dir_all(folder).map_err(cannot)?;
+            write()?;
+        }
     }
     std::fs::create_dir_all(RunFolder::new(folder).log()).map_err(cannot)?;
     folder.canonicalize().map_err(cannot)

@@ -95,7 +95,8 @@ impl Script {
             words.push(format!("--signal=B:USR1@{}", self.warning));
         }
         words.extend(self.sbatch.iter().cloned());
-        let lines: Result<Vec<_>, _> = words.iter().map(|word| Ok(format!("#SBATCH {}", sbatch_word(word)?))).collect();
+        let line = |word: &String| Ok(format!("#SBATCH {}", sbatch_word(word)?));
+        let lines: Result<Vec<_>, Failure> = words.iter().map(line).collect();
         Ok(lines?.join("\n"))
     }
 }
