@@ -149,11 +149,8 @@ impl Segment {
         let (number, step, time) = end;
         let text = format!("{head}{lines}");
         disk::write_atomic(&folder.history_piece(number), text.as_bytes())?;
-        let history = History {
-            lines: lines.lines().count() as u64,
-            bytes: text.len() as u64,
-            sha256: sha256(text.as_bytes()),
-        };
+        let history =
+            History { lines: lines.lines().count() as u64, bytes: text.len() as u64, sha256: sha256(text.as_bytes()) };
         let snapshot = snapshot.map(|(number, digest)| {
             let path = folder.snapshot(number);
             let bytes = fs::metadata(&path).map_err(|error| FileError::reading(&path, &error))?.len();

@@ -2,12 +2,12 @@
 
 mod support;
 
-use formats::checkpoint::{self, Found};
+use formats::checkpoint::{self, Found, Generation, Keep, Outputs};
 use formats::folder::RunFolder;
 use formats::provenance::{self, Entry};
-use formats::snapshot::{self, FileError};
+use formats::snapshot::{self, FileError, Header};
 use mpi::traits::Communicator as _;
-use std::collections::BTreeMap;
+use std::cell::Cell;
 use std::fs;
 use std::path::Path;
 use support::{header, rows, run};
@@ -21,43 +21,63 @@ fn on_ranks() {
     let comm = universe.world();
     let (rank, size) = (comm.rank() as u64, comm.size() as u64);
     let folder = RunFolder::new(folder);
-    let outputs: BTreeMap<String, u64> = [("out/history.csv".to_string(), 5)].into();
+    let outputs = Outputs { segments: Vec::new(), pending: "0,1\n".into() };
     // A number that a careless JSON reader gets wrong in its last bit.
     let clock = serde_json::json!({ "next_snapshot": 0.1f64 + 0.2, "sum": 5e-324, "long": 1.2345678901234567e-7 });
-    let commit = |step: u64, keep: usize| {
-        let mut header = header(COUNT);
-        header.step = step;
-        checkpoint::commit(&folder, &header, &rows(COUNT, rank, size), &clock, &outputs, keep, &comm)
+    let lost = Cell::new(false);
+    let commit = |step: u64, keep: Keep| {
+        let header = Header { step, ..header(COUNT) };
+        let still_ours = || match lost.get() {
+            true => Err(FileError::CannotWrite { path: "LOCK".into(), what: "lost".into() }),
+            false => Ok(()),
+        };
+        let new = Generation {
+            folder: &folder,
+            header: &header,
+            rows: &rows(COUNT, rank, size),
+            clock: &clock,
+            outputs: Some(&outputs),
+            scene: "spacing = 1",
+            job: Some("slurm 7"),
+            keep,
+            still_ours: &still_ours,
+        };
+        checkpoint::commit(&new, &comm)
     };
+    let two = Keep { newest: 2, archive: None };
     match task.as_str() {
         "one" => {
-            commit(7, 2).unwrap();
+            commit(7, two).unwrap();
         }
         "five" => {
             for step in 1..=5 {
-                assert_eq!(commit(step, 2).unwrap(), step);
+                assert_eq!(commit(step, two).unwrap(), step);
+            }
+        }
+        "archive" => {
+            for step in 1..=7 {
+                commit(step, Keep { newest: 1, archive: Some(3) }).unwrap();
             }
         }
         "latest" => {
-            let found = checkpoint::latest_on_all(&folder, &comm).unwrap().unwrap();
-            assert_eq!(found.manifest.clock, clock);
+            let found = checkpoint::latest(&folder).unwrap().unwrap();
+            assert_eq!((found.manifest.clock, found.manifest.outputs), (clock, outputs));
             let (_, read) = snapshot::read_rows(&found.state, snapshot::share(COUNT, rank, size), &comm).unwrap();
             assert!(read.same_bits(&rows(COUNT, rank, size)));
         }
-        "short output" => {
-            let error = commit(9, 2).unwrap_err();
-            assert!(error.to_string().contains("history.csv"), "{error}");
+        "lost" => {
+            lost.set(true);
+            let error = commit(9, two).unwrap_err();
+            assert!(error.to_string().contains("lost"), "{error}");
         }
         other => panic!("no task {other}"),
     }
 }
 
-/// A run folder after the tasks, in which `out/history.csv` holds 5 bytes.
+/// A run folder after a task.
 fn after(task: &str, ranks: usize) -> (tempfile::TempDir, RunFolder) {
     let place = tempfile::tempdir().unwrap();
     let folder = RunFolder::new(place.path());
-    fs::create_dir(folder.out()).unwrap();
-    fs::write(folder.history(), "12345").unwrap();
     run(task, place.path(), ranks);
     (place, folder)
 }
@@ -81,8 +101,8 @@ fn written_on_one_number_of_ranks_read_on_another() {
         let found = latest(&folder);
         assert!(found.warnings.is_empty());
         assert_eq!((found.manifest.generation, found.manifest.step), (1, 7));
-        assert_eq!(found.manifest.outputs["out/history.csv"], 5);
-        digests.push((found.manifest.digest, found.manifest.state_sha256));
+        assert_eq!(found.manifest.ranks, ranks.max(1) as u64);
+        digests.push((found.manifest.digests, found.manifest.state_checksum));
         for other in [0, 2, 5] {
             run("latest", place.path(), other);
         }
@@ -106,6 +126,13 @@ fn keeps_the_newest_and_clears_what_was_unfinished() {
     run("one", place.path(), 1);
     assert_eq!(checkpoint::generations(&folder).unwrap(), [5, 6]);
     assert!(!stale.exists());
+}
+
+#[test]
+fn every_third_is_archived() {
+    let (_place, folder) = after("archive", 1);
+    assert_eq!(checkpoint::generations(&folder).unwrap(), [3, 6, 7]);
+    assert_eq!(latest(&folder).manifest.parent, Some(6));
 }
 
 #[test]
@@ -165,7 +192,7 @@ fn checkpoints_of_an_older_version_are_told_apart() {
     file.group("sph").unwrap().attr("format_version").unwrap().write_scalar(&1u64).unwrap();
     file.close().unwrap();
     let mut sealed: serde_json::Value = serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap();
-    sealed["manifest"]["state_sha256"] = provenance::sha256(&fs::read(&state).unwrap()).into();
+    sealed["manifest"]["state_checksum"] = checkpoint::checksum(&state).unwrap().into();
     sealed["sha256"] = provenance::sha256(sealed["manifest"].to_string().as_bytes()).into();
     fs::write(&manifest, sealed.to_string()).unwrap();
     let error = checkpoint::latest(&folder).unwrap_err();
@@ -175,8 +202,7 @@ fn checkpoints_of_an_older_version_are_told_apart() {
 #[test]
 fn a_failed_commit_leaves_the_older_ones() {
     let (place, folder) = after("five", 2);
-    fs::write(folder.history(), "123").unwrap();
-    run("short output", place.path(), 2);
+    run("lost", place.path(), 2);
     assert_eq!(checkpoint::generations(&folder).unwrap(), [4, 5]);
     assert!(latest(&folder).warnings.is_empty());
     assert!(!folder.checkpoints().join("gen-000006.tmp").exists());

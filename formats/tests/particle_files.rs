@@ -3,7 +3,7 @@
 mod support;
 
 use formats::schema::Kept;
-use formats::snapshot::{self, FileError};
+use formats::snapshot::{self, Digests, FileError};
 use mpi::traits::{Communicator as _, CommunicatorCollectives as _};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -77,7 +77,7 @@ fn fail_together(folder: &Path, rank: u64, size: u64, comm: &formats::h5::Commun
     let (good_header, good) = (header(9), rows(9, rank, size));
     write(&good_header, &good, &path).unwrap();
     let before = fs::read(&path).unwrap();
-    let refused = |outcome: Result<(), FileError>, word: &str| {
+    let refused = |outcome: Result<Digests, FileError>, word: &str| {
         let text = outcome.unwrap_err().to_string();
         assert!(text.contains(word), "{text}");
     };

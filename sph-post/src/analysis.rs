@@ -17,6 +17,7 @@ use crate::{
 };
 use formats::{
     folder::RunFolder,
+    outputs::Index,
     scene::Scene,
     snapshot::{self, FileError},
 };
@@ -290,15 +291,6 @@ pub fn at_times(times: &[f64], wanted: &[f64], scale: f64) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_of_snapshots_are_told_from_others() {
-        assert_eq!(number("snapshot-000012.hdf"), Some(12));
-        assert_eq!(number("snapshot-1000000.hdf"), Some(1_000_000));
-        for name in ["snapshot-12.hdf", "snapshot-000012.hdf.tmp", "snapshot-00001x.hdf", "snapshot.hdf.series"] {
-            assert_eq!(number(name), None, "{name}");
-        }
-    }
 
     #[test]
     fn the_nearest_times_are_found_once() {

@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn times_and_steps() {
-        let minutes = |n| Duration::from_secs(60 * n);
+        let minutes = |n: u64| Duration::from_secs(60 * n);
         assert_eq!("auto".parse(), Ok(Cadence::Auto));
         assert_eq!("500steps".parse(), Ok(Cadence::Steps(500)));
         assert_eq!("10min".parse(), Ok(Cadence::Wall(minutes(10))));

@@ -9,12 +9,12 @@ use formats::scene::Scene;
 use mpi::traits::Communicator as _;
 use sph_run::cli::Cli;
 use sph_run::deadline::Deadline;
-use sph_run::{check, dispatch};
 use sph_run::error::RunError;
 use sph_run::limits::Limits;
 use sph_run::parallel::agree::{agree, share_text};
 use sph_run::resume::{Past, Start, read_scene};
 use sph_run::run::{Outcome, Run};
+use sph_run::{check, dispatch};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -76,10 +76,16 @@ fn launch(comm: &Communicator, cli: &Cli, signalled: Arc<AtomicBool>, begun: Ins
     }
 }
 
-fn run(comm: &Communicator, cli: &Cli, folder: &RunFolder, limits: Limits, begun: Instant) -> Result<Outcome, RunError> {
+fn run(
+    comm: &Communicator,
+    cli: &Cli,
+    folder: &RunFolder,
+    limits: Limits,
+    begun: Instant,
+) -> Result<Outcome, RunError> {
     // Before the lock, whose folder need not be there.
     agree(comm, || read_scene(&folder.scene()))?;
-    let lock = agree(comm, || Ok(RunLock::acquire_within(&folder.lock(), cli.lock_patience)?))?;
+    let lock = agree(comm, || Ok(RunLock::acquire(&folder.lock())?))?;
     let deadline = agree(comm, || Ok(Deadline::find(cli.wall_limit, begun, cli.quiet)))?.unwrap_or_default();
     let mut past = Past::default();
     let start = share_text(comm, || {

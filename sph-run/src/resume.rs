@@ -3,6 +3,7 @@
 
 use crate::cli::Cli;
 use crate::error::RunError;
+use crate::limits::clear_stale_stop_file;
 use crate::simulation::Clock;
 use formats::folder::RunFolder;
 use formats::journal::Event;
@@ -78,6 +79,10 @@ impl Start {
         if let Some(then) = then {
             start.adapt(folder, &then, cli.quiet, ranks)?;
         }
+        if clear_stale_stop_file(folder) {
+            eprintln!("sph-run: warning: a STOP file from before this launch is removed; make it anew to stop the run");
+        }
+        let _ = fs::remove_file(folder.to_continue());
         if !start.fresh() && !cli.quiet {
             eprintln!("sph-run: resuming at t = {:.4} s, step {}", start.clock.time, start.clock.step);
         }

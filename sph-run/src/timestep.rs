@@ -75,7 +75,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             time_step,
             time,
             lists_go_stale: travel > 0.5 * par.skin * (1.0 - 1e-9),
-            requests: Requests { stop: Reason::of_code(stop as u8), checkpoint: checkpoint > 0.0 },
+            requests: Requests { stop: Reason::from_code(stop as u8), checkpoint: checkpoint > 0.0 },
         })
     }
 }

@@ -202,13 +202,7 @@ fn place(dataset: &Dataset) -> hdf5::Result<u64> {
 }
 
 /// This rank's rows of all datasets, to the disk.
-fn write_rows(
-    temporary: &Path,
-    header: &Header,
-    places: &Places,
-    rows: &Rows,
-    kept: Kept,
-) -> Result<(), FileError> {
+fn write_rows(temporary: &Path, header: &Header, places: &Places, rows: &Rows, kept: Kept) -> Result<(), FileError> {
     let fault = |error: io::Error| FileError::writing(temporary, bytes_needed(header.count, kept), &error);
     let file = File::options().write(true).open(temporary).map_err(fault)?;
     let write = || {

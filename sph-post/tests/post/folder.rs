@@ -3,6 +3,7 @@
 use formats::{
     folder::RunFolder,
     h5::Communicator,
+    outputs::{Index, Segment},
     scene::{Scene, Shape},
     schema::Kept,
     snapshot::{self, Header, Rows},
