@@ -9,8 +9,9 @@ programs=@PROGRAMS@
 ranks=${SLURM_NTASKS:-@RANKS@}
 go_on=@GO_ON@ # requeue: this job goes back into the queue; chain: the next job of the chain goes on
 
-# After TERM mpirun kills its ranks; it must leave them the time for a checkpoint.
-export OMPI_MCA_odls_base_sigkill_timeout=@PATIENCE@
+# mpirun kills its ranks twice this many seconds after a TERM; they need time for a checkpoint. Slurm itself kills what
+# is left after its KillWait, 30 s unless set otherwise.
+export OMPI_MCA_odls_base_sigkill_timeout=15
 
 parallel() { exec @LAUNCHER@ -n "$ranks" "$@"; }
 
@@ -18,31 +19,34 @@ say() { echo "$(date -u +%Y-%m-%dT%H:%M:%SZ) job.sh: $*" >&2; }
 
 # USR1 comes before the time limit and at a preemption, TERM before a kill. Both go on to mpirun as USR1, which it hands
 # to every rank, and the ranks stop after a checkpoint.
-child='' stopping='' woken=''
+child='' stopping=''
 stop() {
     say "told to stop ($1)"
-    stopping=$1 woken=yes
+    stopping=$1
     [ -z "$child" ] || kill -s USR1 "$child" 2>/dev/null
 }
 trap 'stop USR1' USR1
 trap 'stop TERM' TERM
 trap 'stop INT' INT
 
-# run_to_end WORD...: the status of the program is left in $status. A signal ends `wait`, not the program: so it waits
-# until no signal came in between; the status of a program that is collected already (127) is known then.
+# run_to_end WORD...: runs a program to its end, whatever signals come meanwhile; its status is left in $status.
 run_to_end() {
     status=75
     [ -z "$stopping" ] || return 0
-    status=127
     "$@" &
-    child=$!
-    woken=yes
-    while [ -n "$woken" ]; do
-        woken=''
-        code=0
-        wait "$child" || code=$?
-        [ "$code" = 127 ] || status=$code
+    child=$! stopped_for=0
+    while kill -s 0 "$child" 2>/dev/null; do
+        # A signal ends this wait, so it is answered at once.
+        sleep 1 &
+        wait $!
+        # Once there is CONTINUE the ranks are through, but mpirun goes on waiting; a second TERM makes it leave.
+        if [ -f CONTINUE ]; then
+            stopped_for=$((stopped_for + 1))
+            [ "$stopped_for" -lt 2 ] || kill -s TERM "$child" 2>/dev/null
+        fi
     done
+    status=0
+    wait "$child" || status=$?
     child=''
 }
 

@@ -30,7 +30,7 @@ pub struct Options {
     #[arg(long, value_name = "N", requires = "local", value_parser = clap::value_parser!(u32).range(1..))]
     slices: Option<u32>,
     #[command(flatten)]
-    slurm_options: slurm::Options,
+    wishes: slurm::Wishes,
     /// Use sph-prep, sph-run and sph-post of this folder instead of building them.
     #[arg(long, value_name = "DIR")]
     programs: Option<PathBuf>,
@@ -63,8 +63,8 @@ pub fn carry_out(name: &str, options: &Options) -> Result<(), Failure> {
         Failure::usage("how many ranks? Name them with --ranks N: a job cannot take them from this machine's cores")
     })?;
     let run = queued(&case, &folder)?;
-    let script = options.slurm_options.script(&run, programs()?.folder(), ranks, &case.name, &options.options)?;
-    slurm::submit(&RunFolder::new(run), &script, &options.slurm_options)
+    let script = options.wishes.script(&run, programs()?.folder(), ranks, &case.name, &options.options)?;
+    slurm::submit(&RunFolder::new(run), &script, &options.wishes)
 }
 
 /// What to run, and where: an existing run folder stands for itself.

@@ -29,7 +29,7 @@ pub struct Script {
     pub go_on: GoOn,
     /// Words for `sbatch`, one a line: `--time=04:00:00`.
     pub sbatch: Vec<String>,
-    /// Seconds that Slurm sends USR1 before the limit, and that ranks have for a checkpoint after TERM.
+    /// Slurm sends USR1 so many seconds before the limit; 0: never.
     pub warning: u32,
     /// Lines that come first: modules.
     pub setup: String,
@@ -62,7 +62,6 @@ impl Script {
             ("@PROGRAMS@", path_word(&self.programs)?),
             ("@RANKS@", self.ranks.to_string()),
             ("@GO_ON@", go_on.to_owned()),
-            ("@PATIENCE@", self.warning.max(10).to_string()),
             ("@LAUNCHER@", launcher.join(" ")),
             ("@OPTIONS@", options),
         ];

@@ -12,7 +12,7 @@ const WARNING: u32 = 120;
 /// What a job asks of Slurm.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Slurm")]
-pub struct Options {
+pub struct Wishes {
     /// Time limit of a job, as Slurm writes it: 04:00:00, 1-12:00:00, 90 (minutes).
     #[arg(long, value_name = "LIMIT", value_parser = limit)]
     time: Option<String>,
@@ -49,7 +49,7 @@ pub struct Options {
     dry_run: bool,
 }
 
-impl Options {
+impl Wishes {
     /// The job script of a run.
     pub fn script(
         &self,
@@ -107,12 +107,12 @@ impl Options {
 }
 
 /// Writes a job script into its run folder, and submits it unless it is a dry run.
-pub fn submit(folder: &RunFolder, script: &Script, options: &Options) -> Result<(), Failure> {
+pub fn submit(folder: &RunFolder, script: &Script, wishes: &Wishes) -> Result<(), Failure> {
     let file = folder.path().join("job.sh");
     let text = script.text()?;
     disk::write_atomic(&file, text.as_bytes()).map_err(|e| Failure { code: e.exit_code(), message: e.to_string() })?;
     let shown = super::script::shell_word(&file.display().to_string());
-    if options.dry_run {
+    if wishes.dry_run {
         print!("{text}");
         eprintln!("talus: nothing is submitted; by hand: sbatch {shown}");
         return Ok(());
@@ -123,7 +123,7 @@ pub fn submit(folder: &RunFolder, script: &Script, options: &Options) -> Result<
         return Err(Failure { code: exit::LOCKED, message });
     }
     let mut before: Option<String> = None;
-    for _ in 0..options.chain.unwrap_or(1) {
+    for _ in 0..wishes.chain.unwrap_or(1) {
         let after = before.as_ref().map(|job| format!("--dependency=afterany:{job}"));
         let submitted = cmd!(shell, "sbatch --parsable {after...} {file}").quiet().read();
         let answer = submitted.map_err(|e| {

@@ -29,7 +29,7 @@ pub fn long(status: &Status, now: SystemTime) -> String {
     if let Some(holder) = &status.holder {
         line("process", format!("{} on {} since {}", holder.pid, holder.host, holder.since));
     }
-    if let Some(progress) = &status.progress {
+    if let (Some(progress), false) = (&status.progress, status.state == State::Done) {
         let news = status.silent.map_or(String::new(), |age| format!(", told {} ago", duration(age)));
         let plural = if progress.ranks == 1 { "" } else { "s" };
         line("rate", format!("{:.3e} particle-steps/s on {} rank{plural}{news}", progress.rate, progress.ranks));
