@@ -140,7 +140,7 @@ pub fn commit(new: &Generation, comm: &Communicator) -> Result<u64, FileError> {
     outcome?;
     // The new generation is safe; only now may older ones go. That one can't be removed is no reason to stop a run.
     if comm.rank() == 0 {
-        let _ = disk::write_atomic(&folder.checkpoints().join("LATEST"), format!("gen-{generation:06}\n").as_bytes());
+        let _ = disk::replace(&folder.checkpoints().join("LATEST"), format!("gen-{generation:06}\n").as_bytes());
         let _ = prune(folder, new.keep);
     }
     Ok(generation)

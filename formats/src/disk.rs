@@ -28,6 +28,16 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     publish(&temporary, path)
 }
 
+/// Replaces a small file whole or not at all, without waiting for the disk: for what can be made again at any time.
+pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    let temporary = temporary(path);
+    let written = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
+    written.map_err(|error| {
+        let _ = fs::remove_file(&temporary);
+        FileError::writing(path, bytes.len() as u64, &error)
+    })
+}
+
 /// Gives a finished file or folder its name, durably: rename, then fsync of the folder above.
 pub fn publish(temporary: &Path, path: &Path) -> Result<(), FileError> {
     fs::rename(temporary, path).map_err(|error| FileError::writing(path, 0, &error))?;

@@ -88,11 +88,8 @@ impl Progress {
     /// `CannotWrite`, `DiskFull`.
     pub fn write(&self, folder: &RunFolder) -> Result<(), FileError> {
         let path = folder.progress();
-        let temporary = disk::temporary(&path);
         let text = serde_json::to_vec_pretty(self).map_err(|error| FileError::cannot_write(&path, error))?;
-        // Not made durable: who reads it later only wants a hint, and a run should not wait for that.
-        let written = fs::write(&temporary, text).and_then(|()| fs::rename(&temporary, &path));
-        written.map_err(|error| FileError::writing(&path, 0, &error))
+        disk::replace(&path, &text)
     }
 
     /// The folder's file; `None` where there is none that can be understood.

@@ -32,6 +32,8 @@ pub enum RunError {
     CannotWrite { path: PathBuf, message: String },
     #[error("{}: the run has begun\nhelp: leave --new out to resume it, or choose another folder", .path.display())]
     HasBegun { path: PathBuf },
+    #[error("{}: end.time: {end} s has passed: the run is at {time} s", .path.display())]
+    EndHasPassed { path: PathBuf, end: f64, time: f64 },
     #[error("{0}, or --wall-limit none")]
     LimitTooShort(String),
     /// On a rank that learnt of rank 0's failure; rank 0 tells the user.
@@ -46,7 +48,7 @@ impl RunError {
     pub fn exit_code(&self) -> i32 {
         match self {
             Self::File(e) => e.exit_code(),
-            Self::Scene(_) | Self::HasBegun { .. } | Self::LimitTooShort(_) => exit::USAGE,
+            Self::Scene(_) | Self::HasBegun { .. } | Self::EndHasPassed { .. } | Self::LimitTooShort(_) => exit::USAGE,
             Self::Numerical { .. } => exit::NUMERICAL,
             Self::Input { .. } => exit::NO_INPUT,
             Self::CannotWrite { .. } => exit::CANNOT_WRITE,

@@ -1,11 +1,10 @@
 //! `sph-run`: time stepping on MPI.
 
 use clap::Parser;
-use formats::exit;
 use formats::folder::RunFolder;
 use formats::h5::Communicator;
-use formats::lock::RunLock;
 use formats::scene::Scene;
+use formats::{exit, lock};
 use mpi::traits::Communicator as _;
 use sph_run::cli::Cli;
 use sph_run::deadline::Deadline;
@@ -14,7 +13,7 @@ use sph_run::limits::Limits;
 use sph_run::parallel::agree::{agree, share_text};
 use sph_run::resume::{Past, Start, read_scene};
 use sph_run::run::{Outcome, Run};
-use sph_run::{check, dispatch};
+use sph_run::{check, dispatch, scheduler};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -85,7 +84,11 @@ fn run(
 ) -> Result<Outcome, RunError> {
     // Before the lock, whose folder need not be there.
     agree(comm, || read_scene(&folder.scene()))?;
-    let lock = agree(comm, || Ok(RunLock::acquire(&folder.lock())?))?;
+    let lock = agree(comm, || {
+        let job = scheduler::job_id(|name| std::env::var(name).ok());
+        let terms = lock::Terms { patience: cli.lock_patience, job };
+        Ok(lock::RunLock::acquire_on(&folder.lock(), &terms, |news| eprintln!("sph-run: {news}"))?)
+    })?;
     let deadline = agree(comm, || Ok(Deadline::find(cli.wall_limit, begun, cli.quiet)))?.unwrap_or_default();
     let mut past = Past::default();
     let start = share_text(comm, || {

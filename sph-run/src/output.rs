@@ -81,7 +81,7 @@ impl Outputs {
         history += &then.pending;
         remove_what_lies_beyond(folder, &index)?;
         index.write(folder)?;
-        disk::write_atomic(&folder.history(), history.as_bytes())?;
+        disk::replace(&folder.history(), history.as_bytes())?;
         let view = append(&folder.history())?;
         let log = folder.log().join("performance.csv");
         let mut performance = append(&log)?;
@@ -137,7 +137,7 @@ impl Outputs {
         let name = |k: u64| self.folder.snapshot(k).file_name().map(|n| n.to_string_lossy().into_owned());
         let files: Vec<_> = there.map(|(k, time)| serde_json::json!({ "name": name(k), "time": time })).collect();
         let series = serde_json::json!({ "file-series-version": "1.0", "files": files });
-        Ok(disk::write_atomic(&self.folder.series(), format!("{series:#}\n").as_bytes())?)
+        Ok(disk::replace(&self.folder.series(), format!("{series:#}\n").as_bytes())?)
     }
 }
 

@@ -82,7 +82,6 @@ impl Start {
         if clear_stale_stop_file(folder) {
             eprintln!("sph-run: warning: a STOP file from before this launch is removed; make it anew to stop the run");
         }
-        let _ = fs::remove_file(folder.to_continue());
         if !start.fresh() && !cli.quiet {
             eprintln!("sph-run: resuming at t = {:.4} s, step {}", start.clock.time, start.clock.step);
         }
@@ -150,9 +149,16 @@ pub fn read_scene(path: &Path) -> Result<String, RunError> {
 /// or other physics.
 fn changed_scene(folder: &RunFolder, prepared: String, path: &Path) -> Result<String, RunError> {
     let text = read_scene(path)?;
-    Scene::read(&path.display().to_string(), &text)?;
-    if Scene::changes(&path.display().to_string(), &prepared, &text)?.is_empty() {
+    let name = path.display().to_string();
+    let scene = Scene::read(&name, &text)?;
+    if Scene::changes(&name, &prepared, &text)?.is_empty() {
         return Ok(prepared);
+    }
+    if let Some(manifest) = checkpoint::newest_manifest(folder)?
+        && manifest.time > scene.end.time
+    {
+        let (end, time) = (scene.end.time, manifest.time);
+        return Err(RunError::EndHasPassed { path: path.into(), end, time });
     }
     disk::write_atomic(&folder.scene(), text.as_bytes())?;
     Ok(text)

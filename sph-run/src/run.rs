@@ -19,7 +19,7 @@ use crate::timestep::Requests;
 use formats::folder::RunFolder;
 use formats::h5::{self, Communicator};
 use formats::journal::{self, Event};
-use formats::lock::RunLock;
+use formats::lock::{LockError, RunLock};
 use formats::scene::Scene;
 use formats::schema::Kept;
 use formats::snapshot::FileError;
@@ -108,7 +108,12 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         }
         self.note(if self.job.start.fresh() { "start" } else { "resume" }, "");
         let mut over = self.outputs_due()?;
-        agree(self.job.comm, || self.check_wall_limit())?;
+        agree(self.job.comm, || {
+            self.check_wall_limit()?;
+            // From here on the run is under way.
+            let _ = std::fs::remove_file(self.job.folder.to_continue());
+            Ok(())
+        })?;
         while !over {
             let begun = Instant::now();
             if self.job.cli.stop_after_steps.is_some_and(|n| self.simulation.clock.step >= first + n) {
@@ -233,7 +238,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
     fn snapshot(&mut self) -> Result<(), RunError> {
         let begun = Instant::now();
         let (comm, folder) = (self.job.comm, self.job.folder);
-        agree(comm, || self.still_ours())?;
+        agree(comm, || Ok(self.still_ours()?))?;
         let number = self.simulation.clock.snapshots;
         let header = self.simulation.header(self.job.scene, &self.job.scene_hash);
         let digests = self.simulation.write_snapshot(&folder.snapshot(number), &header, Kept::Everywhere)?;
@@ -254,8 +259,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
     }
 
     /// Does the folder still belong to this launch? A process that was stopped for long may have lost it to another.
-    fn still_ours(&self) -> Result<(), RunError> {
-        Ok(())
+    fn still_ours(&self) -> Result<(), LockError> {
+        self.job.lock.map_or(Ok(()), RunLock::still_ours)
     }
 
     /// What this rank asks of all.
@@ -284,7 +289,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         let job = &self.job;
         let outputs = self.outputs.as_ref().map(Outputs::now);
         let still_ours = || {
-            let lost = |error: RunError| FileError::CannotWrite { path: "LOCK".into(), what: error.to_string() };
+            let lost = |error: LockError| FileError::CannotWrite { path: "LOCK".into(), what: error.to_string() };
             self.still_ours().map_err(lost)
         };
         let new = checkpoint::Generation {
@@ -298,7 +303,14 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             keep: checkpoint::Keep { newest: job.cli.checkpoint_keep as usize, archive: job.cli.checkpoint_archive },
             still_ours: &still_ours,
         };
-        let generation = checkpoint::commit(&new, job.comm)?;
+        let generation = match checkpoint::commit(&new, job.comm) {
+            Ok(generation) => generation,
+            Err(error) => {
+                // To have lost the folder has an exit code of its own.
+                agree(job.comm, || Ok(self.still_ours()?))?;
+                return Err(error.into());
+            }
+        };
         self.note("checkpoint", &format!("gen-{generation:06} in {:.3} s", begun.elapsed().as_secs_f64()));
         self.pace.wrote_checkpoint(begun.elapsed());
         self.checkpointed = Instant::now();
@@ -345,6 +357,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         if let (Err(error), 0) = (written, self.job.comm.rank()) {
             eprintln!("sph-run: warning: the faulty state could not be kept: {error}");
         }
+        self.note("failed", &fault.to_string());
         RunError::Numerical { fault, state }
     }
 }

@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
     time::Duration,
 };
-use tests::{Output, WorkFolder, command, prepared, run_within};
+use tests::{Output, WorkFolder, command, prepared, run, run_within};
 
 /// Nothing here computes anything: what takes longer hangs.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -465,10 +465,8 @@ fn runs_that_cannot_be_evaluated() {
     let refuse = |name: &str, word: &str| refused_at(&work, "sph-post", &[name], exit::NO_INPUT, name, word);
     refuse("missing", "missing");
     refuse("file", "file");
-    // A run that has not begun is evaluated at its start: that is no fault.
-    fs::create_dir(folder.out()).unwrap();
-    fs::copy(folder.initial(), folder.snapshot(0)).unwrap();
-    let bytes = fs::read(folder.initial()).unwrap();
-    fs::write(folder.snapshot(1), &bytes[..bytes.len() / 2]).unwrap();
-    refuse("run", "snapshot-000001");
+    run("sph-run", &[folder.path().as_os_str(), "--stop-after-steps".as_ref(), "0".as_ref()], 0).expect(exit::RESUMABLE);
+    let bytes = fs::read(folder.snapshot(0)).unwrap();
+    fs::write(folder.snapshot(0), &bytes[..bytes.len() / 2]).unwrap();
+    refuse("run", "snapshot-000000");
 }

@@ -2,13 +2,9 @@
 //! are taken, or on being stopped, killed and resumed: row H5 of the list of verification tests, on the programs.
 
 use formats::{exit, folder::RunFolder};
-use std::collections::BTreeMap;
-use std::ffi::{OsStr, OsString};
-use std::os::unix::ffi::OsStrExt;
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
-use std::{fs, process, thread};
-use tests::{Output, TIME_LIMIT, WorkFolder, assert_same_bits, command, prepared, run, run_within};
+use std::fs;
+use tests::trial::{Trial, hash, outputs, processes, signal, state, while_running};
+use tests::{WorkFolder, prepared};
 
 /// What the scenes share: soft ground, so that a few hundred steps see a flow.
 const SHARED: &str = r#"
@@ -254,253 +250,137 @@ fn scene(text: &str) -> String {
     format!("{text}{SHARED}")
 }
 
-/// One scene, its answer by one rank, and folders to compute it in again.
-struct Trial {
-    work: WorkFolder,
-    reference: RunFolder,
+/// On more ranks, from preparation on; on three of them with particles shared out anew at every build of the lists
+/// and checkpoints at odd moments.
+fn on_other_ranks(trial: &Trial, scene: &str) {
+    let habits = ["--always-rebalance", "--checkpoint-every", "37steps"];
+    for (ranks, habits) in [(2, &[][..]), (3, &habits), (5, &[])] {
+        let folder = prepared(&trial.work, &format!("ranks-{ranks}"), scene, ranks);
+        let digest = |folder: &RunFolder| formats::snapshot::digest(&folder.initial()).unwrap();
+        assert_eq!(digest(&trial.reference), digest(&folder), "initial.hdf of {ranks} ranks");
+        assert_eq!(hash(&trial.reference.initial()), hash(&folder.initial()), "initial.hdf of {ranks} ranks");
+        trial.go(&folder, ranks, habits, exit::DONE);
+        trial.same(&folder);
+    }
 }
 
-impl Trial {
-    fn new(scene: &str) -> Self {
-        let work = WorkFolder::new();
-        let reference = tests::computed(&work, "one", scene, 1);
-        let steps = steps(&reference);
-        assert!((120..2000).contains(&steps), "{steps} steps are not a test");
-        Self { work, reference }
-    }
-
-    /// A folder with the reference's particles, as `sph-prep` leaves it.
-    fn fresh(&self, name: &str) -> RunFolder {
-        let folder = RunFolder::new(self.work.join(name));
-        fs::create_dir(folder.path()).unwrap();
-        for file in [RunFolder::scene, RunFolder::initial, RunFolder::provenance] {
-            fs::copy(file(&self.reference), file(&folder)).unwrap();
-        }
-        folder
-    }
-
-    /// Fails unless the run is done and left the same bits as the reference, file by file.
-    #[track_caller]
-    fn same(&self, folder: &RunFolder) {
-        assert!(folder.done().exists());
-        assert_same_bits(&self.reference, folder);
-        let (here, there) = (outputs(&self.reference), outputs(folder));
-        assert_eq!(here.keys().collect::<Vec<_>>(), there.keys().collect::<Vec<_>>());
-        for (name, hash) in &here {
-            assert_eq!(*hash, there[name], "{name:?}: the bytes differ in {}", folder.path().display());
-        }
-    }
-
-    /// Goes on in a folder. `extra` are options of `sph-run`.
-    #[track_caller]
-    fn go(&self, folder: &RunFolder, ranks: usize, extra: &[&str], code: i32) -> Output {
-        launch(folder, ranks, extra).expect(code)
-    }
-
-    /// On more ranks, from preparation on; on three of them with particles shared out anew at every build of the lists
-    /// and checkpoints at odd moments.
-    fn on_other_ranks(&self, scene: &str) {
-        let habits = ["--always-rebalance", "--checkpoint-every", "37steps"];
-        for (ranks, habits) in [(2, &[][..]), (3, &habits), (5, &[])] {
-            let folder = prepared(&self.work, &format!("ranks-{ranks}"), scene, ranks);
-            let digest = |folder: &RunFolder| formats::snapshot::digest(&folder.initial()).unwrap();
-            assert_eq!(digest(&self.reference), digest(&folder), "initial.hdf of {ranks} ranks");
-            assert_eq!(hash(&self.reference.initial()), hash(&folder.initial()), "initial.hdf of {ranks} ranks");
-            self.go(&folder, ranks, habits, exit::DONE);
-            self.same(&folder);
-        }
-    }
-
-    /// Stopped again and again, and resumed on other numbers of ranks.
-    fn in_pieces(&self) {
-        let folder = self.fresh("pieces");
-        for (ranks, steps) in [(1, "0"), (1, "41"), (3, "1"), (2, "57")] {
-            self.go(&folder, ranks, &["--stop-after-steps", steps], exit::RESUMABLE);
-            assert!(!folder.done().exists());
-        }
-        let resumed = self.go(&folder, 5, &[], exit::DONE);
-        assert!(resumed.stderr.contains("step 99"), "{resumed}");
-        self.same(&folder);
-    }
-
-    /// One rank is killed after the second checkpoint; resumed on another number of ranks.
-    fn after_a_kill(&self) {
-        let folder = self.fresh("killed");
-        let output = while_running(&folder, 3, |folder| {
-            let ranks = processes(folder.path(), "sph-run");
-            signal("KILL", ranks[ranks.len() / 2]);
-        });
-        assert!(!output.timed_out && output.code != exit::DONE && output.code != exit::RESUMABLE, "{output}");
+/// Stopped again and again, and resumed on other numbers of ranks.
+fn in_pieces(trial: &Trial) {
+    let folder = trial.fresh("pieces");
+    for (ranks, steps) in [(1, "0"), (1, "41"), (3, "1"), (2, "57")] {
+        trial.go(&folder, ranks, &["--stop-after-steps", steps], exit::RESUMABLE);
         assert!(!folder.done().exists());
-        let resumed = self.go(&folder, 2, &[], exit::DONE);
-        assert!(resumed.stderr.contains("resuming"), "{resumed}");
-        self.same(&folder);
     }
-
-    /// Once more after the end: nothing happens.
-    fn after_the_end(&self) {
-        let before = state(self.reference.path());
-        self.go(&self.reference, 3, &[], exit::DONE);
-        assert_eq!(before, state(self.reference.path()));
-        self.go(&self.reference, 2, &["--new"], exit::USAGE);
-        assert_eq!(before, state(self.reference.path()));
-    }
-
-    /// Killed between the last checkpoint and the mark that the run is done.
-    fn without_the_last_mark(&self) {
-        fs::remove_file(self.reference.done()).unwrap();
-        let before = outputs(&self.reference);
-        self.go(&self.reference, 2, &[], exit::DONE);
-        assert!(self.reference.done().exists());
-        assert_eq!(before, outputs(&self.reference));
-    }
+    let resumed = trial.go(&folder, 5, &[], exit::DONE);
+    assert!(resumed.stderr.contains("step 99"), "{resumed}");
+    trial.same(&folder);
 }
 
-fn launch(folder: &RunFolder, ranks: usize, extra: &[&str]) -> Output {
-    let mut arguments = vec![folder.path().as_os_str()];
-    arguments.extend(extra.iter().map(OsStr::new));
-    run("sph-run", &arguments, ranks)
+/// One rank is killed after the second checkpoint; resumed on another number of ranks.
+fn after_a_kill(trial: &Trial) {
+    let folder = trial.fresh("killed");
+    let output = while_running(&folder, 3, |folder| {
+        let ranks = processes(folder.path(), "sph-run");
+        signal("KILL", ranks[ranks.len() / 2]);
+    });
+    assert!(!output.timed_out && output.code != exit::DONE && output.code != exit::RESUMABLE, "{output}");
+    assert!(!folder.done().exists());
+    let resumed = trial.go(&folder, 2, &[], exit::DONE);
+    assert!(resumed.stderr.contains("resuming"), "{resumed}");
+    trial.same(&folder);
 }
 
-/// Steps of a run, from the last line of its history.
-fn steps(folder: &RunFolder) -> u64 {
-    let history = fs::read_to_string(folder.history()).unwrap();
-    history.lines().last().and_then(|line| line.split(',').nth(1)?.parse().ok()).expect("a second column")
+/// Once more after the end: nothing happens.
+fn after_the_end(trial: &Trial) {
+    let before = state(trial.reference.path());
+    trial.go(&trial.reference, 3, &[], exit::DONE);
+    assert_eq!(before, state(trial.reference.path()));
+    trial.go(&trial.reference, 2, &["--new"], exit::USAGE);
+    assert_eq!(before, state(trial.reference.path()));
 }
 
-fn hash(path: &Path) -> String {
-    formats::provenance::sha256(&fs::read(path).unwrap())
-}
-
-/// Hashes of the bytes of everything in out/.
-fn outputs(folder: &RunFolder) -> BTreeMap<OsString, String> {
-    let entries = fs::read_dir(folder.out()).unwrap().map(|entry| entry.unwrap());
-    entries.map(|entry| (entry.file_name(), hash(&entry.path()))).collect()
-}
-
-/// Every file below a folder, its length and when it was written.
-fn state(folder: &Path) -> BTreeMap<PathBuf, (u64, SystemTime)> {
-    let mut found = BTreeMap::new();
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let facts = fs::metadata(&path).unwrap();
-        if facts.is_dir() {
-            found.extend(state(&path));
-        } else {
-            found.insert(path, (facts.len(), facts.modified().unwrap()));
-        }
-    }
-    found
-}
-
-/// Starts a run with a checkpoint every 20 steps and, once there are two, does something to it.
-fn while_running(folder: &RunFolder, ranks: usize, act: impl FnOnce(&RunFolder) + Send) -> Output {
-    thread::scope(|scope| {
-        scope.spawn(|| {
-            let deadline = Instant::now() + Duration::from_secs(60);
-            while !folder.generation(2).join("MANIFEST.json").exists() {
-                assert!(Instant::now() < deadline, "no checkpoint within a minute");
-                thread::sleep(Duration::from_millis(2));
-            }
-            act(folder);
-        });
-        let arguments = [folder.path().as_os_str(), "--checkpoint-every".as_ref(), "20steps".as_ref()];
-        run_within(TIME_LIMIT, &mut command("sph-run", &arguments, ranks))
-    })
-}
-
-/// Processes of a program that name a folder of this test in their arguments.
-fn processes(folder: &Path, program: &str) -> Vec<u32> {
-    let numbers = fs::read_dir("/proc").unwrap().filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
-    let matches = |pid: &u32| {
-        let Ok(line) = fs::read(format!("/proc/{pid}/cmdline")) else { return false };
-        let arguments: Vec<&[u8]> = line.split(|&byte| byte == 0).collect();
-        let name = Path::new(OsStr::from_bytes(arguments[0])).file_name();
-        name == Some(OsStr::new(program)) && arguments.contains(&folder.as_os_str().as_bytes())
-    };
-    let found: Vec<u32> = numbers.filter(matches).collect();
-    assert!(!found.is_empty(), "no {program} runs in {}", folder.display());
-    found
-}
-
-fn signal(name: &str, process: u32) {
-    let status = process::Command::new("kill").args(["-s", name, &process.to_string()]).status();
-    assert!(status.expect("kill starts").success());
+/// Killed between the last checkpoint and the mark that the run is done.
+fn without_the_last_mark(trial: &Trial) {
+    fs::remove_file(trial.reference.done()).unwrap();
+    let before = outputs(&trial.reference);
+    trial.go(&trial.reference, 2, &[], exit::DONE);
+    assert!(trial.reference.done().exists());
+    assert_eq!(before, outputs(&trial.reference));
 }
 
 #[test]
 fn plane_strain() {
     let text = scene(PLANE);
     let trial = Trial::new(&text);
-    trial.on_other_ranks(&text);
-    trial.in_pieces();
-    trial.after_a_kill();
-    trial.after_the_end();
-    trial.without_the_last_mark();
+    on_other_ranks(&trial, &text);
+    in_pieces(&trial);
+    after_a_kill(&trial);
+    after_the_end(&trial);
+    without_the_last_mark(&trial);
 }
 
 #[test]
 fn axisymmetric() {
     let text = scene(RINGS);
     let trial = Trial::new(&text);
-    trial.on_other_ranks(&text);
-    trial.in_pieces();
-    trial.after_a_kill();
+    on_other_ranks(&trial, &text);
+    in_pieces(&trial);
+    after_a_kill(&trial);
 }
 
 #[test]
 fn three_d() {
     let text = scene(SOLID);
     let trial = Trial::new(&text);
-    trial.on_other_ranks(&text);
-    trial.in_pieces();
-    trial.after_a_kill();
+    on_other_ranks(&trial, &text);
+    in_pieces(&trial);
+    after_a_kill(&trial);
 }
 
 #[test]
 fn mu_i() {
     let trial = Trial::new(GRAINS);
-    trial.on_other_ranks(GRAINS);
-    trial.in_pieces();
+    on_other_ranks(&trial, GRAINS);
+    in_pieces(&trial);
 }
 
 #[test]
 fn stabilised() {
     let trial = Trial::new(STABILISED);
-    trial.on_other_ranks(STABILISED);
-    trial.in_pieces();
+    on_other_ranks(&trial, STABILISED);
+    in_pieces(&trial);
 }
 
 #[test]
 fn visco_plastic() {
     let trial = Trial::new(FLUID);
-    trial.on_other_ranks(FLUID);
-    trial.in_pieces();
+    on_other_ranks(&trial, FLUID);
+    in_pieces(&trial);
 }
 
 #[test]
 fn periodic() {
     let text = scene(PERIOD).replace("slip = \"no-slip\"", "slip = \"no-slip\"\nvelocity = [\"0.5 m/s\", 0, 0]");
     let trial = Trial::new(&text);
-    trial.on_other_ranks(&text);
-    trial.in_pieces();
-    trial.after_a_kill();
+    on_other_ranks(&trial, &text);
+    in_pieces(&trial);
+    after_a_kill(&trial);
 }
 
 #[test]
 fn between_mirror_walls() {
     let text = scene(CORNER).replace("slip = \"no-slip\"", "slip = \"no-slip\"\nkind = \"mirror\"");
     let trial = Trial::new(&text);
-    trial.on_other_ranks(&text);
-    trial.in_pieces();
+    on_other_ranks(&trial, &text);
+    in_pieces(&trial);
 }
 
 #[test]
 fn slab_of_mirrors_and_periods() {
     let text = scene(SLAB);
     let trial = Trial::new(&text);
-    trial.on_other_ranks(&text);
-    trial.in_pieces();
+    on_other_ranks(&trial, &text);
+    in_pieces(&trial);
 }
 
 /// By a signal to mpirun, by one to a single rank, by a file: exit code 75, and the same command goes on.
@@ -537,5 +417,5 @@ fn at_rest() {
     let history = fs::read_to_string(reference.history()).unwrap();
     assert!((3..15).contains(&history.lines().count()), "it should come to rest before its end time:\n{history}");
     let trial = Trial { work, reference };
-    trial.without_the_last_mark();
+    without_the_last_mark(&trial);
 }

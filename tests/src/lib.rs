@@ -1,7 +1,10 @@
 //! What tests of the programs share: building and finding them, work folders, running on ranks with a time limit, and
 //! comparing results.
 
+pub mod damage;
 pub mod python;
+pub mod shim;
+pub mod trial;
 
 use formats::{folder::RunFolder, snapshot};
 use std::ffi::OsStr;
@@ -33,10 +36,11 @@ pub fn target() -> (PathBuf, PathBuf) {
 /// tests in other processes waiting meanwhile.
 pub fn program(name: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(build).join(name)
+    FOLDER.get_or_init(|| build(&["-p", "sph-prep", "-p", "sph-run", "-p", "sph-post"])).join(name)
 }
 
-fn build() -> PathBuf {
+/// Has cargo build what the words say, in the profile and the target folder of the test; returns the profile's folder.
+fn build(what: &[&str]) -> PathBuf {
     let (target, folder) = target();
     let profile = match folder.file_name().and_then(OsStr::to_str) {
         Some("debug") | None => "dev",
@@ -44,7 +48,8 @@ fn build() -> PathBuf {
     };
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)
-        .args(["build", "--quiet", "-p", "sph-prep", "-p", "sph-run", "-p", "sph-post", "--profile", profile])
+        .args(["build", "--quiet", "--profile", profile])
+        .args(what)
         .arg("--target-dir")
         .arg(target)
         .current_dir(repository())
@@ -79,6 +84,11 @@ impl WorkFolder {
     #[allow(clippy::new_without_default)]
     pub fn new() -> Self {
         Self(Some(tempfile::Builder::new().prefix("talus-").tempdir().expect("a temporary folder")))
+    }
+    /// The same in memory where the system has a place for that: many short runs that write much wait less.
+    pub fn in_memory() -> Self {
+        let made = tempfile::Builder::new().prefix("talus-").tempdir_in("/dev/shm");
+        made.map_or_else(|_| Self::new(), |folder| Self(Some(folder)))
     }
     /// The folder.
     pub fn path(&self) -> &Path {

@@ -1,6 +1,7 @@
 //! Starts the stages of a run in order. `./talus` at the root of the repository hands its words to this program.
 
 mod batch;
+mod bench;
 mod cases;
 mod failure;
 mod gate;
@@ -76,6 +77,11 @@ enum Command {
         #[command(flatten)]
         options: study::Options,
     },
+    /// Measure what costs how much; writes tests/bench.
+    Bench {
+        #[command(subcommand)]
+        bench: bench::Bench,
+    },
     /// Run every test of the repository; ends with exit code 1 where one fails.
     Test {
         /// Handed on to the test runner.
@@ -123,6 +129,7 @@ fn carry_out(command: Command) -> Result<(), Failure> {
         Command::Validate { names, ranks, reuse } => validate::all(&names, ranks, reuse),
         Command::Study { name: None, .. } => study::list(),
         Command::Study { name: Some(name), options } => study::carry_out(&name, &options),
+        Command::Bench { bench } => bench::carry_out(&bench),
         Command::Test { arguments } => gate::test(&arguments),
         Command::Help => {
             use clap::CommandFactory;

@@ -89,7 +89,8 @@ impl Programs {
         &self.folder
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    /// Path of one of them.
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 }

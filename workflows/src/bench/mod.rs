@@ -1,0 +1,70 @@
+//! `bench`: what costs how much, measured so that anyone can repeat it.
+
+mod checkpoint;
+
+use crate::{failure::Failure, paths};
+use std::path::PathBuf;
+
+/// What can be measured.
+#[derive(Debug, clap::Subcommand)]
+pub enum Bench {
+    /// Checkpoints: bandwidth beside the file system's own, share of the time at the automatic interval, time to restart.
+    Checkpoint {
+        /// Particles of the scene, about.
+        #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+        particles: u64,
+        /// Numbers of ranks.
+        #[arg(long, value_name = "N,..", value_delimiter = ',', default_values_t = [1, 2])]
+        ranks: Vec<u32>,
+    },
+}
+
+/// Measures, and writes the table into tests/bench.
+pub fn carry_out(bench: &Bench) -> Result<(), Failure> {
+    let page = match bench {
+        Bench::Checkpoint { particles, ranks } => checkpoint::measure(*particles, ranks)?,
+    };
+    println!("{}", paths::short(&page).display());
+    Ok(())
+}
+
+/// Where the tables are kept.
+fn folder() -> PathBuf {
+    paths::repository().join("tests").join("bench")
+}
+
+/// Least, middle and largest of some numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Spread {
+    least: f64,
+    median: f64,
+    largest: f64,
+}
+
+impl Spread {
+    /// # Panics
+    /// Of no numbers.
+    fn of(numbers: &[f64]) -> Self {
+        let mut sorted = numbers.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        Self { least: sorted[0], median: sorted[sorted.len() / 2], largest: sorted[sorted.len() - 1] }
+    }
+
+    /// `0.52 (0.48 - 0.61)`.
+    fn text(&self, digits: usize) -> String {
+        let Self { least, median, largest } = self;
+        format!("{median:.digits$} ({least:.digits$} - {largest:.digits$})")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spreads() {
+        let spread = Spread::of(&[3.0, 1.0, 2.0]);
+        assert_eq!(spread, Spread { least: 1.0, median: 2.0, largest: 3.0 });
+        assert_eq!(spread.text(1), "2.0 (1.0 - 3.0)");
+    }
+}
