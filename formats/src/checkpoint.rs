@@ -116,7 +116,7 @@ pub struct Generation<'a> {
     pub job: Option<&'a str>,
     /// (0)
     pub keep: Keep,
-    /// (0) Asked right before the generation gets its name: does this process still own the folder?
+    /// (0) Does this process still own the folder? Asked before anything is removed and before the generation gets its name.
     pub still_ours: &'a dyn Fn() -> Result<(), FileError>,
 }
 
@@ -128,13 +128,13 @@ pub struct Generation<'a> {
 pub fn commit(new: &Generation, comm: &Communicator) -> Result<u64, FileError> {
     let begun = Instant::now();
     let folder = new.folder;
-    let generation = h5::from_root(comm, || begin(folder))?;
+    let generation = h5::from_root(comm, || (new.still_ours)().and_then(|()| begin(folder)))?;
     let unfinished = unfinished(folder, generation);
     let outcome = write_verified(&unfinished.join(STATE), new, comm).and_then(|(digests, checksum)| {
         let ranks = comm.size() as u64;
         h5::from_root(comm, || seal(new, generation, ranks, begun, digests, checksum))
     });
-    if outcome.is_err() && comm.rank() == 0 {
+    if outcome.is_err() && comm.rank() == 0 && (new.still_ours)().is_ok() {
         let _ = fs::remove_dir_all(&unfinished);
     }
     outcome?;

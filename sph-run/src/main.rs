@@ -3,6 +3,7 @@
 use clap::Parser;
 use formats::folder::RunFolder;
 use formats::h5::Communicator;
+use formats::provenance::{self, Entry};
 use formats::scene::Scene;
 use formats::{exit, lock};
 use mpi::traits::Communicator as _;
@@ -94,6 +95,8 @@ fn run(
     let start = share_text(comm, || {
         Ok(match Start::find(folder, cli, comm.size() as u64)? {
             Some((start, then)) => {
+                // For people: that it can't be noted is no reason not to run.
+                let _ = provenance::append(&folder.provenance(), Entry::this("sph-run", comm.size() as usize));
                 past = then;
                 start.to_json().to_string()
             }
@@ -111,5 +114,13 @@ fn run(
     let scene_hash = Scene::hash(&start.scene);
     let lock = lock.as_ref();
     let run = Run { comm, cli, folder, scene: &scene, scene_hash, start, past, limits, deadline, lock };
-    dispatch::resolve(&scene, run)
+    let outcome = dispatch::resolve(&scene, run);
+    if outcome.is_err() {
+        // Whatever failed: to have lost the folder to another launch explains it, and has an exit code of its own.
+        agree(comm, || match lock.map_or(Ok(()), lock::RunLock::still_ours) {
+            Err(lost @ lock::LockError::Lost { .. }) => Err(lost.into()),
+            _ => Ok(()),
+        })?;
+    }
+    outcome
 }

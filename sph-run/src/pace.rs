@@ -85,7 +85,7 @@ impl Pace {
             return Ok(());
         }
         Err(format!(
-            "a wall limit of {:.1} s leaves no time to compute: stopping with a checkpoint takes up to {:.1} s; \
+            "{:.1} s are left of the wall limit, too little to compute: stopping with a checkpoint takes up to {:.1} s; \
              give more time",
             left.as_secs_f64(),
             margin.as_secs_f64()

@@ -76,7 +76,10 @@ impl Job for Run<'_> {
             simulation.begin();
         }
         let then = std::mem::take(&mut self.past.outputs);
-        let outputs = agree(self.comm, || Outputs::open(self.folder, then, self.scene.space))?;
+        let outputs = agree(self.comm, || {
+            self.lock.map_or(Ok(()), RunLock::still_ours)?;
+            Outputs::open(self.folder, then, self.scene.space)
+        })?;
         let progress = Progress::new(self.cli.quiet || rank != 0, &simulation.clock, self.scene.end.time, count);
         let pace = Pace::new(self.past.write_seconds.map(Duration::from_secs_f64));
         let scales = Scales::new(self.scene);
@@ -135,15 +138,16 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             self.pace.stepped(begun.elapsed());
             over = self.outputs_due()?;
             self.progress.tell(&self.simulation.clock);
-            self.report_progress();
+            self.report_progress(false);
         }
         self.checkpoint(true)?;
         self.finish()
     }
 
     /// Marks the run as done.
-    fn finish(&self) -> Result<Outcome, RunError> {
+    fn finish(&mut self) -> Result<Outcome, RunError> {
         self.progress.finish();
+        self.report_progress(true);
         let (folder, comm) = (self.job.folder, self.job.comm);
         agree(comm, || Ok(disk::write_atomic(&folder.done(), b"the run reached its end\n")?))?;
         self.note("done", "");
@@ -159,10 +163,10 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         }
     }
 
-    /// Tells scripts and people how far the run is, if it is time to; rank 0 only.
-    fn report_progress(&mut self) {
+    /// Tells scripts and people how far the run is, `now` or if it is time to; rank 0 only.
+    fn report_progress(&mut self, now: bool) {
         let job = &self.job;
-        if job.lock.is_some() && self.progress.due() {
+        if job.lock.is_some() && (now || self.progress.due()) {
             let ranks = job.comm.size() as u64;
             let report = self.progress.report(&self.simulation.clock, ranks);
             let (job_id, deadline) = (job.deadline.job.clone(), job.deadline.text());
@@ -275,7 +279,9 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             Cadence::Wall(interval) => root && since >= interval,
             Cadence::Auto => root && since >= self.pace.checkpoint_interval(self.job.cli.mtbf),
         };
-        let out_of_time = self.job.deadline.left().is_some_and(|left| left <= self.pace.margin());
+        // Each launch takes one step at least: a job that is submitted until the run is done must come to an end.
+        let moved = self.simulation.clock.step > self.job.start.clock.step;
+        let out_of_time = moved && self.job.deadline.left().is_some_and(|left| left <= self.pace.margin());
         let stop = match self.job.limits.reason(root) {
             None if out_of_time => Some(Reason::WallLimit),
             asked => asked,
@@ -303,14 +309,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             keep: checkpoint::Keep { newest: job.cli.checkpoint_keep as usize, archive: job.cli.checkpoint_archive },
             still_ours: &still_ours,
         };
-        let generation = match checkpoint::commit(&new, job.comm) {
-            Ok(generation) => generation,
-            Err(error) => {
-                // To have lost the folder has an exit code of its own.
-                agree(job.comm, || Ok(self.still_ours()?))?;
-                return Err(error.into());
-            }
-        };
+        let generation = checkpoint::commit(&new, job.comm)?;
         self.note("checkpoint", &format!("gen-{generation:06} in {:.3} s", begun.elapsed().as_secs_f64()));
         self.pace.wrote_checkpoint(begun.elapsed());
         self.checkpointed = Instant::now();
@@ -323,6 +322,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         self.check_finite()?;
         self.checkpoint(false)?;
         self.progress.finish();
+        self.report_progress(true);
         let (folder, clock) = (self.job.folder, self.simulation.clock);
         agree(self.job.comm, || {
             // The request is honoured once.

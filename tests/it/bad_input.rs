@@ -465,7 +465,8 @@ fn runs_that_cannot_be_evaluated() {
     let refuse = |name: &str, word: &str| refused_at(&work, "sph-post", &[name], exit::NO_INPUT, name, word);
     refuse("missing", "missing");
     refuse("file", "file");
-    run("sph-run", &[folder.path().as_os_str(), "--stop-after-steps".as_ref(), "0".as_ref()], 0).expect(exit::RESUMABLE);
+    run("sph-run", &[folder.path().as_os_str(), "--stop-after-steps".as_ref(), "0".as_ref()], 0)
+        .expect(exit::RESUMABLE);
     let bytes = fs::read(folder.snapshot(0)).unwrap();
     fs::write(folder.snapshot(0), &bytes[..bytes.len() / 2]).unwrap();
     refuse("run", "snapshot-000000");

@@ -75,7 +75,7 @@ impl Scene {
         }
         match faults.into_list() {
             faults if faults.is_empty() => Ok(changes),
-            faults => Err(SceneError { file: name.to_string(), faults: faults }),
+            faults => Err(SceneError { file: name.to_string(), faults }),
         }
     }
 
