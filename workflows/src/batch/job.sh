@@ -34,15 +34,14 @@ run_to_end() {
     status=75
     [ -z "$stopping" ] || return 0
     "$@" &
-    child=$! stopped_for=0
+    child=$!
     while kill -s 0 "$child" 2>/dev/null; do
         # A signal ends this wait, so it is answered at once.
         sleep 1 &
         wait $!
-        # Once there is CONTINUE the ranks are through, but mpirun goes on waiting; a second TERM makes it leave.
-        if [ -f CONTINUE ]; then
-            stopped_for=$((stopped_for + 1))
-            [ "$stopped_for" -lt 2 ] || kill -s TERM "$child" 2>/dev/null
+        # With CONTINUE written and LOCK gone the ranks are through, but mpirun goes on waiting: a second TERM makes it leave.
+        if [ -f CONTINUE ] && [ ! -f LOCK ]; then
+            kill -s TERM "$child" 2>/dev/null
         fi
     done
     status=0
