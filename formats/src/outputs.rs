@@ -184,3 +184,53 @@ fn check_history(path: &Path, listed: &History, bytes: &[u8]) -> Result<(), File
         false => Err(FileError::damaged(path, "its bytes do not match the checksum in index.json")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEAD: &str = "time [s],step [1]\n";
+
+    /// A folder with two segments, without snapshots.
+    fn written() -> (tempfile::TempDir, RunFolder, Index) {
+        let place = tempfile::tempdir().unwrap();
+        let folder = RunFolder::new(place.path());
+        fs::create_dir_all(folder.history_pieces()).unwrap();
+        let first = Segment::write(&folder, (0, 0, 0.0), HEAD, "0e0,0\n", None).unwrap();
+        let second = Segment::write(&folder, (1, 9, 0.1 + 0.2), HEAD, "1e-1,4\n3e-1,9\n", None).unwrap();
+        let index = Index { segments: vec![first, second], ..Index::default() };
+        index.write(&folder).unwrap();
+        (place, folder, index)
+    }
+
+    #[test]
+    fn pieces_join_to_one_history() {
+        let (_place, folder, index) = written();
+        assert_eq!(Index::read(&folder).unwrap().as_ref(), Some(&index));
+        assert_eq!(index.history(&folder).unwrap(), format!("{HEAD}0e0,0\n1e-1,4\n3e-1,9\n"));
+        assert_eq!(index.segments[1].history.lines, 2);
+        assert!(index.faults(&folder).is_empty());
+        assert_eq!(Index::read(&RunFolder::new("/nowhere")).unwrap(), None);
+    }
+
+    #[test]
+    fn damage_is_named() {
+        let (_place, folder, index) = written();
+        let piece = folder.history_piece(1);
+        for bytes in [&b"time [s],step [1]\n1e-1,4\n3e-1,8\n"[..], b"", b"time [s],step [1]\n1e-1,4\n"] {
+            fs::write(&piece, bytes).unwrap();
+            let error = index.history(&folder).unwrap_err();
+            assert!(matches!(&error, FileError::Damaged { path, .. } if path.ends_with("000001.csv")), "{error}");
+            assert_eq!(index.faults(&folder), [error]);
+        }
+        fs::remove_file(&piece).unwrap();
+        assert!(matches!(index.history(&folder), Err(FileError::NotFound { .. })));
+
+        fs::write(folder.index(), "{\"format_version\": 2, \"parts\": []}").unwrap();
+        assert!(matches!(Index::read(&folder), Err(FileError::Newer { found: 2, known: 1, .. })));
+        for text in ["", "{}", "[]", "{\"format_version\": 1}"] {
+            fs::write(folder.index(), text).unwrap();
+            assert!(matches!(Index::read(&folder), Err(FileError::Damaged { .. })), "{text}");
+        }
+    }
+}

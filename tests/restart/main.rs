@@ -3,6 +3,7 @@
 mod batch;
 mod faults;
 mod generations;
+mod golden;
 mod limits;
 mod outputs;
 mod scene;

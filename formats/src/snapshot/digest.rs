@@ -92,3 +92,61 @@ fn add_column<T: Copy>(sum: &mut u128, first: u64, width: usize, values: &[T], b
         *sum = sum.wrapping_add(xxh3_128(&row[..8 * (1 + width)]));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::snapshot::share;
+
+    /// Rows of a range, made from their numbers alone.
+    fn rows(range: std::ops::Range<u64>) -> Rows {
+        let ids: Vec<u64> = range.clone().collect();
+        let real = |salt: f64| ids.iter().map(|&id| (id as f64 + salt).sin()).collect::<Vec<f64>>();
+        Rows {
+            first: range.start,
+            body: vec![0; ids.len()],
+            position: real(1.0).into_iter().map(|x| [x, -0.0, x]).collect(),
+            velocity: vec![[0.0; 3]; ids.len()],
+            acceleration: vec![[0.0; 3]; ids.len()],
+            mass: real(2.0),
+            density: real(3.0),
+            stress: real(4.0).into_iter().map(|s| [s; 6]).collect(),
+            stress_work: real(5.0),
+            viscous_work: real(6.0),
+            plastic_strain: real(7.0),
+            id: ids,
+        }
+    }
+
+    fn sums(ranges: impl IntoIterator<Item = std::ops::Range<u64>>) -> Digests {
+        let mut sums = Sums::new(Kept::Checkpoint);
+        ranges.into_iter().for_each(|range| sums.add(&rows(range)));
+        sums.finish()
+    }
+
+    #[test]
+    fn who_holds_which_rows_does_not_matter() {
+        let whole = sums([0..100]);
+        for size in [2, 3, 7] {
+            assert_eq!(sums((0..size).rev().map(|rank| share(100, rank, size))), whole);
+        }
+        assert_ne!(sums([0..99]), whole);
+    }
+
+    #[test]
+    fn every_change_shows_in_its_field_alone() {
+        let whole = sums([0..100]);
+        let changed = |change: fn(&mut Rows)| {
+            let (mut sums, mut rows) = (Sums::new(Kept::Checkpoint), rows(0..100));
+            change(&mut rows);
+            sums.add(&rows);
+            let digests = sums.finish();
+            digests.different(&whole).join(",")
+        };
+        assert_eq!(changed(|_| {}), "");
+        assert_eq!(changed(|rows| rows.position[41][1] = 0.0), "position");
+        assert_eq!(changed(|rows| rows.mass.swap(3, 4)), "mass");
+        assert_eq!(changed(|rows| rows.body[99] = 1), "body");
+        assert_eq!(changed(|rows| rows.stress[7][5] = f64::from_bits(rows.stress[7][5].to_bits() ^ 1)), "stress");
+    }
+}
