@@ -16,7 +16,7 @@ use tests::{Output, TIME_LIMIT, WorkFolder, computed, program, run_within, workf
 
 /// Long enough to be met running.
 fn scene() -> String {
-    let longer = [("\"150 ms\"", "\"15 s\""), ("\"40 ms\"", "\"4 s\""), ("\"7 ms\"", "\"0.1 s\"")];
+    let longer = [("\"150 ms\"", "\"5 s\""), ("\"40 ms\"", "\"2 s\""), ("\"7 ms\"", "\"0.1 s\"")];
     longer.iter().fold(short::RINGS.to_owned(), |text, (old, new)| text.replace(old, new))
 }
 
@@ -116,6 +116,8 @@ impl Played {
     fn new(sph_run: &str, words: &[&str]) -> Self {
         let work = WorkFolder::new();
         let played = Self { folder: RunFolder::new(work.join("a run")), work };
+        // The script looks once a second whether its program has ended.
+        played.play("sleep", "exec /bin/sleep 0.05");
         played.play("mpirun", "shift 2; exec \"$@\"");
         played.play("sph-run", sph_run);
         played.play("sph-post", "echo evaluated");
