@@ -169,3 +169,23 @@ fn run(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        Arguments::command().debug_assert();
+        let parse = |words: &str| Arguments::try_parse_from(format!("talus {words}").split(' '));
+        assert!(parse("batch x.toml --ranks 4 --chain 3 --sbatch-option=--mem=4G -- --mtbf 2h").is_ok());
+        assert!(parse("batch x.toml --local --slice 10min --slices 2 -- --quiet").is_ok());
+        for words in ["batch x --local", "batch x --slice 1min", "batch x --slurm --local --slice 1min", "status"] {
+            assert!(parse(words).is_err(), "{words}");
+        }
+        assert!(
+            parse("batch x --ranks 2 --time 4h").is_err() && parse("batch x --local --slice 9s --chain 2").is_err()
+        );
+    }
+}

@@ -21,7 +21,7 @@ pub struct Options {
     #[arg(long, conflicts_with_all = ["local", "slice", "slices"])]
     slurm: bool,
     /// Slices on this machine, without a scheduler.
-    #[arg(long, requires = "slice")]
+    #[arg(long, requires = "slice", conflicts_with_all = slurm::ONLY)]
     local: bool,
     /// Wall time of a local slice, such as 10min.
     #[arg(long, value_name = "TIME", requires = "local")]

@@ -131,3 +131,89 @@ fn sbatch_word(word: &str) -> Result<String, Failure> {
 fn plain(word: &str) -> bool {
     !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || "_-./:=,+@%".contains(c))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::launch;
+    use std::path::Path;
+    use xshell::cmd;
+
+    fn script() -> Script {
+        Script {
+            name: "column $1".into(),
+            run: "/runs/it's \"a\" $run".into(),
+            programs: "/programs".into(),
+            launcher: vec!["srun".into(), "--mpi=pmix".into()],
+            ranks: 64,
+            go_on: GoOn::Requeue,
+            sbatch: vec!["--time=04:00:00".into(), "--comment=a \"b\" \\c".into()],
+            warning: 120,
+            setup: "module load openmpi\n".into(),
+            options: vec!["--checkpoint-every".into(), "2 h".into()],
+        }
+    }
+
+    #[test]
+    fn words_come_back_from_the_shell() {
+        let shell = launch::shell().unwrap();
+        for word in ["plain", "", "a b", "it's", "\"$HOME\" `id` \\ * ~ #", "-n", "'", "a\\'b", "ä=µ", "@RUN@"] {
+            let line = format!("printf %s {}", shell_word(word));
+            assert_eq!(cmd!(shell, "sh -c {line}").quiet().read().unwrap(), word, "{line}");
+        }
+        assert_eq!(shell_word("--time=04:00:00"), "--time=04:00:00");
+    }
+
+    /// As Slurm 22.05 reads it.
+    #[test]
+    fn words_for_sbatch_are_in_double_quotes() {
+        assert_eq!(sbatch_word("--time=04:00:00").unwrap(), "--time=04:00:00");
+        assert_eq!(sbatch_word("--chdir=/a b/c").unwrap(), "--chdir=\"/a b/c\"");
+        assert_eq!(sbatch_word(r#"--comment=it's "b" \c"#).unwrap(), r#"--comment="it's \"b\" \\c""#);
+        assert_eq!(sbatch_word("a b").unwrap(), "\"a b\"");
+        assert_eq!(sbatch_word("--comment=a\nb").unwrap_err().code, formats::exit::USAGE);
+    }
+
+    #[test]
+    fn every_mark_is_filled_in() {
+        let text = script().text().unwrap();
+        let left = ["@SBATCH@", "@SETUP@", "@RUN@", "@PROGRAMS@", "@RANKS@", "@GO_ON@", "@LAUNCHER@", "@OPTIONS@"];
+        assert!(left.iter().all(|mark| TEMPLATE.contains(mark) && !text.contains(mark)), "{text}");
+        let lines = [
+            "#SBATCH --job-name=\"column $1\"",
+            "#SBATCH --requeue",
+            "#SBATCH --signal=B:USR1@120",
+            "#SBATCH --comment=\"a \\\"b\\\" \\\\c\"",
+            "module load openmpi",
+            "run='/runs/it'\\''s \"a\" $run'",
+            "programs=/programs",
+            "ranks=${SLURM_NTASKS:-64}",
+            "parallel() { exec srun --mpi=pmix -n \"$ranks\" \"$@\"; }",
+        ];
+        for line in lines {
+            assert!(text.lines().any(|l| l == line), "no line {line}\n{text}");
+        }
+        assert!(text.contains("${changed:+--scene scene.toml} --checkpoint-every '2 h'\n"), "{text}");
+        // What is filled in may look like a mark.
+        let odd = Script { run: "/@RANKS@".into(), setup: String::new(), warning: 0, go_on: GoOn::Chain, ..script() };
+        let text = odd.text().unwrap();
+        assert!(text.contains("run=/@RANKS@\n") && text.contains("\nset -u\n") && !text.contains("USR1@"), "{text}");
+        assert!(text.contains("\ngo_on=chain ") && text.contains("\n#SBATCH --no-requeue\n"), "{text}");
+        let broken = Script { run: "/a\nb".into(), ..script() };
+        assert_eq!(broken.text().unwrap_err().code, formats::exit::USAGE);
+    }
+
+    #[test]
+    fn the_script_is_a_sound_shell_script() {
+        let (shell, work) = (launch::shell().unwrap(), tempfile::tempdir().unwrap());
+        for go_on in [GoOn::Requeue, GoOn::Chain] {
+            let file = work.path().join("job.sh");
+            std::fs::write(&file, Script { go_on, ..script() }.text().unwrap()).unwrap();
+            cmd!(shell, "sh -n {file}").quiet().run().unwrap();
+            if ["/usr/bin/shellcheck", "/usr/local/bin/shellcheck"].iter().any(|path| Path::new(path).exists()) {
+                let said = cmd!(shell, "shellcheck {file}").quiet().ignore_status().read().unwrap();
+                assert!(said.is_empty(), "{said}");
+            }
+        }
+    }
+}

@@ -9,6 +9,10 @@ use xshell::{Shell, cmd};
 /// Longest warning before the limit, s.
 const WARNING: u32 = 120;
 
+/// Options that mean nothing without Slurm.
+pub const ONLY: [&str; 11] =
+    ["time", "partition", "account", "qos", "nodes", "sbatch_option", "module", "setup", "chain", "warning", "dry_run"];
+
 /// What a job asks of Slurm.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Slurm")]
@@ -142,7 +146,11 @@ pub fn submit(folder: &RunFolder, script: &Script, wishes: &Wishes) -> Result<()
 
 /// Jobs of this user that run this script or wait for it; none where Slurm cannot be asked.
 fn waiting(shell: &Shell, file: &Path) -> Vec<String> {
-    let listed = cmd!(shell, "squeue --me --noheader").arg("--format=%A %o").quiet().ignore_stderr().read();
+    let listed = cmd!(shell, "squeue --me --noheader --states=PENDING,CONFIGURING,RUNNING,SUSPENDED")
+        .arg("--format=%A %o")
+        .quiet()
+        .ignore_stderr()
+        .read();
     let matches = |line: &str| {
         let (job, command) = line.trim().split_once(' ')?;
         (Path::new(command.trim()) == file).then(|| job.to_owned())
