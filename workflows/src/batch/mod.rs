@@ -29,14 +29,14 @@ pub struct Options {
     /// Stop after so many local slices (exit code 75) even if the run is not done.
     #[arg(long, value_name = "N", requires = "local", value_parser = clap::value_parser!(u32).range(1..))]
     slices: Option<u32>,
-    #[command(flatten)]
-    wishes: slurm::Wishes,
     /// Use sph-prep, sph-run and sph-post of this folder instead of building them.
     #[arg(long, value_name = "DIR")]
     programs: Option<PathBuf>,
-    /// Options for sph-run, after `--`: for instance `-- --checkpoint-every 30min`.
+    /// Options for sph-run, after `--`, such as `-- --checkpoint-every 30min`.
     #[arg(last = true, value_name = "SPH-RUN OPTION")]
     options: Vec<String>,
+    #[command(flatten)]
+    wishes: slurm::Wishes,
 }
 
 /// Starts a case, a scene file or a run folder in slices.

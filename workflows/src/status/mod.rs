@@ -5,14 +5,14 @@ mod text;
 use crate::{failure::Failure, paths};
 use formats::folder::RunFolder;
 use formats::journal::{Event, Progress};
-use formats::lock::Holder;
+use formats::lock::{self, Holder};
 use formats::{checkpoint, outputs::Index, scene::Scene, snapshot};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// Silence after which a run counts as perhaps no longer there, s. It tells how far it is every 5 s.
+/// Silence after which the holder of a lock counts as perhaps no longer there, s: a launch waits for less.
 const SILENCE: f64 = 120.0;
 
 /// What a run is doing.
@@ -138,8 +138,10 @@ impl Status {
         let read = |e: formats::snapshot::FileError| Failure { code: e.exit_code(), message: e.to_string() };
         let text = fs::read_to_string(&scene).unwrap_or_default();
         let end = Scene::read(&scene.display().to_string(), &text).ok().map(|scene| scene.end.time);
-        let holder = fs::read(folder.lock()).ok().and_then(|bytes| serde_json::from_slice::<Holder>(&bytes).ok());
-        let holder = holder.filter(|holder| !is_gone(holder));
+        let holder = lock::holder(&folder.lock()).filter(|holder| holder.runs() != Some(false));
+        // Where the process can't be asked, the lock's file tells: its holder renews it all the time.
+        let asked = holder.as_ref().is_some_and(|holder| holder.runs() == Some(true));
+        let alive = asked || age(&folder.lock()).is_some_and(|age| age < SILENCE);
         let progress = Progress::read(folder);
         let index = Index::read(folder).map_err(read)?.unwrap_or_default();
         let checkpoint = checkpoint::newest_manifest(folder).map_err(read)?.map(|manifest| Newest {
@@ -172,7 +174,7 @@ impl Status {
             more_slices: None,
             events: Vec::new(),
         };
-        status.state = status.judge(folder, &events);
+        status.state = status.judge(folder, &events, alive);
         status.reach(&index);
         status.foresee(SystemTime::now());
         status.events = events[events.len().saturating_sub(4)..].to_vec();
@@ -192,11 +194,11 @@ impl Status {
         text::reached(self)
     }
 
-    fn judge(&self, folder: &RunFolder, events: &[Event]) -> State {
+    fn judge(&self, folder: &RunFolder, events: &[Event], alive: bool) -> State {
         let failed = || events.last().is_some_and(|event| event.event == "failed") || fault_is_news(folder, events);
         match () {
-            () if self.holder.is_some() && self.silent.is_some_and(|s| s > SILENCE) => State::Silent,
-            () if self.holder.is_some() => State::Running,
+            () if self.holder.is_some() && alive => State::Running,
+            () if self.holder.is_some() => State::Silent,
             () if folder.done().is_file() => State::Done,
             () if self.stop.is_some() => State::Stopped,
             () if failed() => State::Failed,
@@ -242,14 +244,6 @@ impl Status {
             self.more_slices = Some(((left - here).max(0.0) / length).ceil() as u64);
         }
     }
-}
-
-/// Is it certain that the holder of a lock no longer runs? Only its own machine can tell.
-fn is_gone(holder: &Holder) -> bool {
-    let own = |path: &str| fs::read_to_string(path).map(|text| text.trim().to_owned()).unwrap_or_default();
-    holder.host == own("/proc/sys/kernel/hostname")
-        && (holder.boot != own("/proc/sys/kernel/random/boot_id")
-            || !Path::new("/proc").join(holder.pid.to_string()).exists())
 }
 
 /// Was a faulty state written after the last event?

@@ -32,20 +32,13 @@ fn progress(elapsed: f64, left: f64, deadline: f64) -> Progress {
     }
 }
 
-/// This process as the holder of a lock.
-fn own() -> Holder {
-    let read = |path: &str| fs::read_to_string(path).unwrap().trim().to_owned();
-    Holder {
-        host: read("/proc/sys/kernel/hostname"),
-        boot: read("/proc/sys/kernel/random/boot_id"),
-        pid: std::process::id(),
-        started: 0,
-        since: now(),
-    }
-}
-
-fn lock(folder: &RunFolder, holder: &Holder) {
-    fs::write(folder.lock(), serde_json::to_vec(holder).unwrap()).unwrap();
+/// Leaves the lock of this process, with one word of it changed.
+fn leave_lock(folder: &RunFolder, old: &str, new: &str) {
+    let lock = lock::RunLock::acquire(&folder.lock()).unwrap();
+    let text = fs::read_to_string(folder.lock()).unwrap();
+    assert!(text.contains(old), "{text}");
+    drop(lock);
+    fs::write(folder.lock(), text.replace(old, new)).unwrap();
 }
 
 #[test]
@@ -59,21 +52,25 @@ fn every_state_is_told() {
     fs::rename(folder.path().join("scene.toml"), folder.scene()).unwrap();
     assert_eq!(state(&folder), State::NotStarted);
 
-    lock(&folder, &own());
+    let lock = lock::RunLock::acquire(&folder.lock()).unwrap();
     assert_eq!(state(&folder), State::Running);
     progress(10.0, 60.0, 300.0).write(&folder).unwrap();
     let running = Status::of(&folder).unwrap();
     assert_eq!((running.state, running.step, running.time), (State::Running, 1000, 0.1));
     assert!(running.ends.is_some() && running.more_slices == Some(0));
-    let old = Progress { updated: "2020-01-01T00:00:00Z".into(), ..progress(10.0, 60.0, 300.0) };
-    old.write(&folder).unwrap();
-    assert_eq!(state(&folder), State::Silent);
+    drop(lock);
 
     // The process is gone: what it said last is not kept, the checkpoint is.
-    lock(&folder, &Holder { pid: u32::MAX, ..own() });
+    let own = format!("\"pid\": {}", std::process::id());
+    leave_lock(&folder, &own, "\"pid\": 4194305");
     let broken = Status::of(&folder).unwrap();
     assert_eq!((broken.state, broken.step), (State::BrokenOff, 0));
-    lock(&folder, &Holder { pid: u32::MAX, host: "elsewhere".into(), ..own() });
+    // On another machine: as long as its lock is renewed.
+    fs::remove_file(folder.lock()).unwrap();
+    leave_lock(&folder, "\"host\": \"", "\"host\": \"far-");
+    assert_eq!(state(&folder), State::Running);
+    let long_ago = SystemTime::now() - Duration::from_secs(600);
+    fs::File::options().append(true).open(folder.lock()).unwrap().set_modified(long_ago).unwrap();
     assert_eq!(state(&folder), State::Silent);
     fs::remove_file(folder.lock()).unwrap();
 
@@ -88,23 +85,23 @@ fn every_state_is_told() {
     assert_eq!((done.state, done.fraction(), done.left), (State::Done, Some(1.0), None));
 }
 
-/// Slices of 100 s: of the present one 60 s are left, 300 s are to compute.
+/// Slices of 100 s: of the present one 60 s are left, 290 s are to compute.
 #[test]
 fn slices_are_counted() {
     let (_place, folder) = prepared();
-    lock(&folder, &own());
+    let lock = lock::RunLock::acquire(&folder.lock()).unwrap();
     let scene = fs::read_to_string(folder.scene()).unwrap();
     let end = Scene::read("scene", &scene).unwrap().end.time;
     let to_end = end * 0.25;
-    Progress { time: end - to_end, end, ..progress(40.0, 300.0, 60.0) }.write(&folder).unwrap();
+    Progress { time: end - to_end, end, ..progress(40.0, 290.0, 60.0) }.write(&folder).unwrap();
     let running = Status::of(&folder).unwrap();
-    assert!((running.left.unwrap() - 300.0).abs() < 1e-6, "{running:?}");
+    assert!((running.left.unwrap() - 290.0).abs() < 1e-6, "{running:?}");
     assert_eq!(running.more_slices, Some(3), "{running:?}");
     let shown = text::long(&running, SystemTime::now());
     assert!(shown.contains("slurm 7, has to end at") && shown.contains("3 more slices after it"), "{shown}");
     assert!(shown.contains("75.0 %") && shown.contains("5000") && shown.lines().count() <= 15, "{shown}");
     // Stopped with no checkpoint: all is to do again, which is four times as much.
-    fs::remove_file(folder.lock()).unwrap();
+    drop(lock);
     let broken = Status::of(&folder).unwrap();
     assert_eq!((broken.state, broken.more_slices), (State::BrokenOff, Some(12)), "{broken:?}");
 }
