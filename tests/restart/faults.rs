@@ -42,13 +42,13 @@ fn disk_full_at_any_write() {
         (0, full(1, "write", "LOCK.new*")),
         (0, full(1, "allocate", "out/snapshot-*")),
         // Of the file's structure, then of rows.
-        (0, full(3, "write", "out/snapshot-*")),
-        (0, full(30, "write", "out/snapshot-*")),
+        (0, full(1, "write", "out/snapshot-*")),
+        (0, full(13, "write", "out/snapshot-*")),
         (0, full(1, "write", "out/history/000000.csv.tmp")),
         (0, full(1, "write", "out/index.json.tmp")),
         (0, full(3, "allocate", STATE)),
         (0, full(4, "allocate", STATE)),
-        (0, full(3, "write", STATE)),
+        (0, full(1, "write", STATE)),
         (0, full(65, "write", STATE)),
         (0, full(2, "write", MANIFEST)),
         (0, full(3, "write", "out/history.csv")),
@@ -65,7 +65,7 @@ fn calls_that_fail() {
     let on = |code: i32, at, kind: &str, files: &str| Fault::new(format!("fail-on:{code}"), at).of(kind, files);
     let faults = [
         (0, fails(libc::EROFS, 1, "create", "LOCK.new*")),
-        (0, fails(libc::EDQUOT, 20, "write", "out/snapshot-*")),
+        (0, fails(libc::EDQUOT, 12, "write", "out/snapshot-*")),
         (0, fails(libc::EIO, 1, "sync", "out/snapshot-*")),
         (0, fails(libc::EIO, 40, "write", STATE)),
         (0, fails(libc::EDQUOT, 2, "write", MANIFEST)),
@@ -101,7 +101,7 @@ fn written_wrongly() {
     trial.same(&folder);
     // An output that went wrong on the way to the disk is found by the check.
     let folder = trial.fresh("output");
-    let (output, struck) = strike(&folder, 0, &[], &Fault::new("flip", 60).of("write", "out/snapshot-*"));
+    let (output, struck) = strike(&folder, 0, &[], &Fault::new("flip", 13).of("write", "out/snapshot-*"));
     if output.code == exit::DONE {
         let check = launch(&folder, 0, &["--check"]).expect(exit::NO_INPUT);
         assert!(check.stdout.contains("out/snapshot-"), "{struck:?}: {check}");

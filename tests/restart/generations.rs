@@ -47,7 +47,7 @@ fn killed_at_any_kind_of_call() {
     let points = [
         ("torn", 1, "create", "LOCK.new*"),
         ("torn", 1, "link", "LOCK"),
-        ("torn", 20, "write", "out/snapshot-000000.hdf.tmp"),
+        ("torn", 12, "write", "out/snapshot-000000.hdf.tmp"),
         ("kill", 1, "rename", "out/snapshot-000000.hdf"),
         ("torn", 1, "write", "out/history/000000.csv.tmp"),
         ("kill", 1, "rename", "out/index.json"),

@@ -4,6 +4,7 @@ mod batch;
 mod bench;
 mod cases;
 mod failure;
+mod faults;
 mod gate;
 mod launch;
 mod paths;
@@ -82,6 +83,12 @@ enum Command {
         #[command(subcommand)]
         bench: bench::Bench,
     },
+    /// Kill, starve and damage small runs some thousand times, and see whether any work is lost; writes
+    /// tests/faults/REPORT.md. Takes about an hour.
+    Faults {
+        #[command(flatten)]
+        options: faults::Options,
+    },
     /// Run every test of the repository; ends with exit code 1 where one fails.
     Test {
         /// Handed on to the test runner.
@@ -130,6 +137,7 @@ fn carry_out(command: Command) -> Result<(), Failure> {
         Command::Study { name: None, .. } => study::list(),
         Command::Study { name: Some(name), options } => study::carry_out(&name, &options),
         Command::Bench { bench } => bench::carry_out(&bench),
+        Command::Faults { options } => faults::carry_out(&options),
         Command::Test { arguments } => gate::test(&arguments),
         Command::Help => {
             use clap::CommandFactory;
