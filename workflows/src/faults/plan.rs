@@ -162,7 +162,8 @@ fn failing(grounds: &[Ground]) -> Vec<Trial> {
             let own = calls.iter().filter(|call| call.rank == rank).filter(read);
             let before = own.take_while(|call| !call.path.contains(".tmp")).count();
             for number in 1..=before as u64 {
-                put("resume", ranks, number, fails(number, rank), &[DONE, NO_INPUT]);
+                // Folders are opened to be put on the disk.
+                put("resume", ranks, number, fails(number, rank), &[DONE, CANNOT_WRITE, NO_INPUT]);
             }
         }
     }
