@@ -27,7 +27,9 @@ fn one_after_another(trial: &Trial, name: &str, faults: &[(usize, Fault)], codes
         let (output, struck) = strike(&folder, *ranks, &OFTEN, fault);
         assert!(codes.contains(&output.code), "{struck:?}: {output}");
         assert!(output.stderr.contains("sph-run: error: "), "{struck:?}: {output}");
-        assert!(!folder.done().exists() && !folder.lock().exists(), "{struck:?}: {output}");
+        // Where nothing can be changed any more, the lock stays too; the next launch knows that its process is gone.
+        let unlocked = fault.deed.starts_with("fail-on") || !folder.lock().exists();
+        assert!(!folder.done().exists() && unlocked, "{struck:?}: {output}");
         generation = nothing_lost(&folder, generation, &struck[0]);
     }
     assert!(generation > 0, "no checkpoint was written meanwhile");
@@ -101,7 +103,7 @@ fn written_wrongly() {
     trial.same(&folder);
     // An output that went wrong on the way to the disk is found by the check.
     let folder = trial.fresh("output");
-    let (output, struck) = strike(&folder, 0, &[], &Fault::new("flip", 13).of("write", "out/snapshot-*"));
+    let (output, struck) = strike(&folder, 0, &[], &Fault::new("flip", 5).of("write", "out/snapshot-*"));
     if output.code == exit::DONE {
         let check = launch(&folder, 0, &["--check"]).expect(exit::NO_INPUT);
         assert!(check.stdout.contains("out/snapshot-"), "{struck:?}: {check}");
@@ -203,6 +205,8 @@ fn in_a_write(folder: &RunFolder, ranks: usize, wait: u32, act: impl FnOnce() + 
     let _ = fs::remove_file(&log);
     let arguments = [folder.path().as_os_str(), OFTEN[0].as_ref(), OFTEN[1].as_ref()];
     let mut command = command("sph-run", &arguments, ranks);
+    // What mpirun gives its ranks after a TERM, once to go on and once to end, s.
+    command.env("OMPI_MCA_odls_base_sigkill_timeout", "3");
     let fault = Fault::new(format!("sleep:{wait}"), 2).of("sync", STATE);
     fault.put(&mut command, &library(), folder.path(), &log).unwrap();
     let output = meanwhile(command, || log.exists(), act);
@@ -246,8 +250,9 @@ fn signals() {
     let arguments = [folder.path().as_os_str(), OFTEN[0].as_ref(), OFTEN[1].as_ref()];
     let output = meanwhile(command("sph-run", &arguments, 3), next(newest(&folder).0), || signal("INT", rank(2)));
     stopped(output, exit::RESUMABLE, "INT in a step");
-    // mpirun answers TERM with status 1, and ends its ranks seconds later: the mark says that the run can go on.
-    let output = in_a_write(&folder, 2, 100, || signal("TERM", mpirun()));
+    // mpirun hands TERM on after a while, ends its ranks after another, and answers with status 1 whatever they say: the
+    // mark says that the run can go on.
+    let output = in_a_write(&folder, 2, 3300, || signal("TERM", mpirun()));
     stopped(output, 1, "TERM to mpirun");
     trial.go(&folder, 2, &[], exit::DONE);
     assert!(!folder.to_continue().exists());

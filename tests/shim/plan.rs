@@ -9,16 +9,16 @@
 //! | `TALUS_FAULT_CALLS` | names of [`Kind`], with commas; all that change something where it is not set |
 //! | `TALUS_FAULT_FILES` | only paths in the folder of this form: `?` stands for one letter, `*` for any number of them |
 //! | `TALUS_FAULT_AT` | the number of the call, from 1, counted in each process on its own |
-//! | `TALUS_FAULT_DO` | `count`, `kill`, `torn`, `short`, `flip`, `suspend`, `sleep:MS`, `fail:CODE`, `fail-on:CODE`, `full:CODE` |
+//! | `TALUS_FAULT_DO` | `count`, `kill`, `torn`, `short`, `flip`, `suspend`, `sleep:MS`, `slow:MS`, `clock:S`, `fail:CODE`, `fail-on:CODE`, `full:CODE` |
 //!
-//! `torn`: killed after half of a write, else after the call; `short`: half is written, and said so; `fail-on`: at that
-//! call and all that follow; `full`: from there on no rank can write or allocate anything anywhere in the folder. CODE
+//! `torn`: killed after half of a write, else after the call; `short`: half is written, and said so; `clock`: the time of
+//! day jumps so many seconds; `fail-on`, `slow`: at that call and all that follow; `full`: from there on no rank can write or allocate anything anywhere in the folder. CODE
 //! as the system numbers it.
 
 use crate::raw::{self, Place};
 use libc::c_int;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// What a call does.
@@ -79,6 +79,8 @@ enum Deed {
     Flip,
     Suspend,
     Sleep(Duration),
+    Slow(Duration),
+    Clock(i64),
     Fail(c_int),
     FailOn(c_int),
     Full(c_int),
@@ -99,6 +101,13 @@ struct Plan {
 
 static COUNTED: AtomicU64 = AtomicU64::new(0);
 static FAILING: AtomicBool = AtomicBool::new(false);
+/// Seconds that the time of day is off.
+static JUMPED: AtomicI64 = AtomicI64::new(0);
+
+/// How far the time of day has jumped, s.
+pub fn jumped() -> i64 {
+    JUMPED.load(Ordering::SeqCst)
+}
 
 /// Counts a call and says what is to be done with it. `bytes`: how many it writes or reads.
 pub fn judge(kind: Kind, place: Place, bytes: usize) -> Verdict {
@@ -138,6 +147,8 @@ impl Plan {
             "flip" => Deed::Flip,
             "suspend" => Deed::Suspend,
             "sleep" => Deed::Sleep(Duration::from_millis(number.parse().ok()?)),
+            "slow" => Deed::Slow(Duration::from_millis(number.parse().ok()?)),
+            "clock" => Deed::Clock(number.parse().ok()?),
             "fail" => Deed::Fail(number.parse().ok()?),
             "fail-on" => Deed::FailOn(number.parse().ok()?),
             "full" => Deed::Full(number.parse().ok()?),
@@ -186,6 +197,9 @@ impl Plan {
         if let (true, Deed::FailOn(code)) = (FAILING.load(Ordering::SeqCst), self.deed) {
             return Some(Verdict::Fail(code));
         }
+        if let (true, Deed::Slow(time)) = (number > self.at, self.deed) {
+            std::thread::sleep(time);
+        }
         if number != self.at {
             return None;
         }
@@ -201,7 +215,11 @@ impl Plan {
                 raw::suspend();
                 None
             }
-            Deed::Sleep(time) => {
+            Deed::Clock(seconds) => {
+                JUMPED.store(seconds, Ordering::SeqCst);
+                None
+            }
+            Deed::Sleep(time) | Deed::Slow(time) => {
                 std::thread::sleep(time);
                 None
             }
