@@ -173,6 +173,33 @@ pub fn latest(folder: &RunFolder) -> Result<Option<Found>, FileError> {
     Err(FileError::damaged(&folder.checkpoints(), what))
 }
 
+/// The sound generation of a step; if several, the newest. Those after it are set aside, under names that no launch looks
+/// at. Serial.
+///
+/// # Errors
+/// `CannotRead` where there is none of that step, with the steps there are; as [`verify`]; `CannotWrite`.
+pub fn go_back(folder: &RunFolder, step: u64) -> Result<Found, FileError> {
+    let generations = generations(folder)?;
+    let manifest =
+        |&generation: &u64| Some((generation, read_manifest(&folder.generation(generation), generation).ok()?));
+    let manifests: Vec<_> = generations.iter().filter_map(manifest).collect();
+    let Some((generation, _)) = manifests.iter().rev().find(|(_, manifest)| manifest.step == step) else {
+        let steps: Vec<_> = manifests.iter().map(|(_, manifest)| manifest.step.to_string()).collect();
+        let what = format!("no checkpoint of step {step}; there are those of {}", steps.join(", "));
+        return Err(FileError::CannotRead { path: folder.checkpoints().display().to_string(), what });
+    };
+    let manifest = verify(folder, *generation)?;
+    // The newest first: wherever this is cut off, the newest that is left is a state the run was in.
+    for later in generations.into_iter().filter(|later| later > generation).rev() {
+        let place = folder.generation(later);
+        let aside = (1..).map(|n| folder.checkpoints().join(format!("aside-{later:06}-{n}"))).find(|p| !p.exists());
+        let moved = aside.map_or(Ok(()), |aside| fs::rename(&place, aside));
+        moved.map_err(|error| FileError::writing(&place, 0, &error))?;
+    }
+    disk::sync_folder(&folder.checkpoints())?;
+    Ok(Found { state: folder.generation(*generation).join(STATE), manifest, warnings: Vec::new() })
+}
+
 /// The newest generation whose manifest is sound, without a look at its state. Serial.
 ///
 /// # Errors

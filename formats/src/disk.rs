@@ -1,11 +1,15 @@
 //! Writing that survives a crash: whole or not at all, and room made sure of beforehand.
 
+use crate::provenance::host;
 use crate::snapshot::FileError;
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::os::fd::AsRawFd;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
+use std::process;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// `path` with `.tmp` appended: where a file is written before it gets its name.
 pub fn temporary(path: &Path) -> PathBuf {
@@ -81,12 +85,60 @@ pub(crate) fn reserve(path: &Path, needed: u64) -> Result<(), FileError> {
     file.set_len(0).map_err(fault)
 }
 
-/// Gives every byte of the file at `path` its place on the disk, so that writing them cannot fail for want of room.
-/// Call when the file has its final length.
-pub(crate) fn allocate(path: &Path) -> Result<(), FileError> {
+/// An empty file for this process alone, in memory where the system has a place for that, and what `open` makes of its
+/// path, which is gone after that.
+pub(crate) fn in_memory<T>(open: impl FnOnce(&Path) -> T) -> io::Result<(File, T)> {
+    static NUMBER: AtomicU64 = AtomicU64::new(0);
+    let name = format!("talus-{}-{}-{}", host(), process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
+    let make = |folder: &Path| {
+        let path = folder.join(&name);
+        // One left by a process of the same number.
+        let _ = fs::remove_file(&path);
+        let file = File::options().read(true).write(true).create_new(true).open(&path)?;
+        Ok((file, path))
+    };
+    let (file, path) = make(Path::new("/dev/shm")).or_else(|_: io::Error| make(&std::env::temp_dir()))?;
+    let opened = open(&path);
+    let _ = fs::remove_file(&path);
+    Ok((file, opened))
+}
+
+/// Makes the file at `path`, which is there, a copy of another. Every byte gets its place on the disk, so that writing them later
+/// cannot fail for want of room; but only what is no hole in the original is written.
+pub(crate) fn copy_sparse(original: &File, path: &Path) -> Result<(), FileError> {
     let fault = |needed, error: io::Error| FileError::writing(path, needed, &error);
-    let file = File::options().write(true).open(path).map_err(|e| fault(0, e))?;
-    let length = file.metadata().map_err(|e| fault(0, e))?.len();
+    let length = original.metadata().map_err(|e| fault(0, e))?.len();
+    let copy = || {
+        let file = File::options().write(true).open(path)?;
+        file.set_len(length)?;
+        allocate(&file, length)?;
+        let mut place = 0;
+        while let Some(begin) = seek(original, place, libc::SEEK_DATA)? {
+            let end = seek(original, begin, libc::SEEK_HOLE)?.unwrap_or(length);
+            let mut bytes = vec![0; (end - begin) as usize];
+            original.read_exact_at(&mut bytes, begin)?;
+            file.write_all_at(&bytes, begin)?;
+            place = end;
+        }
+        Ok(())
+    };
+    copy().map_err(|error| fault(length, error))
+}
+
+/// The next place from `place` on of this kind; `None` if there is none.
+fn seek(file: &File, place: u64, kind: libc::c_int) -> io::Result<Option<u64>> {
+    // SAFETY: a system call on an open file; it touches no memory of ours.
+    match unsafe { libc::lseek(file.as_raw_fd(), place as libc::off_t, kind) } {
+        -1 => match io::Error::last_os_error() {
+            error if error.raw_os_error() == Some(libc::ENXIO) => Ok(None),
+            error => Err(error),
+        },
+        found => Ok(Some(found as u64)),
+    }
+}
+
+/// Gives every byte of a file its place on the disk.
+fn allocate(file: &File, length: u64) -> io::Result<()> {
     if length == 0 {
         return Ok(());
     }
@@ -95,6 +147,6 @@ pub(crate) fn allocate(path: &Path) -> Result<(), FileError> {
         0 => Ok(()),
         // A file system that can't allocate ahead: go on without the guard.
         libc::EOPNOTSUPP | libc::EINVAL | libc::ENOSYS => Ok(()),
-        code => Err(fault(length, io::Error::from_raw_os_error(code))),
+        code => Err(io::Error::from_raw_os_error(code)),
     }
 }

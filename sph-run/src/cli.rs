@@ -31,6 +31,11 @@ pub struct Cli {
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
 
+    /// Go back to the checkpoint of this step (see --check) and go on from there. Later ones are set aside, and what was
+    /// put out after it is dropped.
+    #[arg(long, value_name = "STEP", conflicts_with = "new")]
+    pub resume: Option<u64>,
+
     /// Stop in time, with a checkpoint (exit code 75), before so much wall time has gone by, such as 90min or 24h;
     /// `auto`: what the job has left, asked of Slurm, PBS or LSF.
     #[arg(long, value_name = "TIME", default_value = "auto")]

@@ -51,15 +51,24 @@ impl Start {
                 Some(manifest) => !compare(folder, &manifest.scene, &scene)?.is_empty(),
                 None => false,
             };
-            if !extended {
+            if !extended && cli.resume.is_none() {
                 if !cli.quiet {
                     eprintln!("sph-run: nothing to do, the run is done");
                 }
                 return Ok(None);
             }
-            fs::remove_file(folder.done()).map_err(|error| FileError::writing(&folder.done(), 0, &error))?;
         }
-        let (mut start, past, then) = match checkpoint::latest(folder)? {
+        let found = match cli.resume {
+            Some(step) => Some(checkpoint::go_back(folder, step)?),
+            None => checkpoint::latest(folder)?,
+        };
+        match fs::remove_file(folder.done()) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(FileError::writing(&folder.done(), 0, &error).into());
+            }
+            _ => {}
+        }
+        let (mut start, past, then) = match found {
             None => {
                 let start = Self { scene, particles: folder.initial(), clock: Clock::default(), over: false };
                 (start, Past::default(), None)

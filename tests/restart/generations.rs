@@ -16,8 +16,8 @@ use tests::shim::{Call, Fault};
 use tests::trial::{Trial, calls, copy, launch, meanwhile, newest, processes, short, signal, strike};
 
 /// Steps between checkpoints where a run is killed often.
-const INTERVAL: u64 = 3;
-const OFTEN: [&str; 2] = ["--checkpoint-every", "3steps"];
+pub(crate) const INTERVAL: u64 = 3;
+pub(crate) const OFTEN: [&str; 2] = ["--checkpoint-every", "3steps"];
 
 /// The last step that is in the live history, which is written as the run goes on.
 fn last_line(folder: &RunFolder) -> u64 {
@@ -29,7 +29,7 @@ fn last_line(folder: &RunFolder) -> u64 {
 /// Fails unless all generations that were published are still good for a start, and no more than one interval of steps
 /// is to be done again. Returns the newest generation.
 #[track_caller]
-fn nothing_lost(folder: &RunFolder, before: u64, struck: &str) -> u64 {
+pub(crate) fn nothing_lost(folder: &RunFolder, before: u64, struck: &str) -> u64 {
     let (generation, step) = newest(folder);
     assert!(generation >= before, "generation {before} is lost, {generation} is the newest; {struck}");
     let reached = last_line(folder);
@@ -47,7 +47,7 @@ fn killed_at_any_kind_of_call() {
     let points = [
         ("torn", 1, "create", "LOCK.new*"),
         ("torn", 1, "link", "LOCK"),
-        ("torn", 20, "write", "out/snapshot-000000.hdf.tmp"),
+        ("torn", 12, "write", "out/snapshot-000000.hdf.tmp"),
         ("kill", 1, "rename", "out/snapshot-000000.hdf"),
         ("torn", 1, "write", "out/history/000000.csv.tmp"),
         ("kill", 1, "rename", "out/index.json"),

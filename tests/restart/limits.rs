@@ -6,7 +6,7 @@
 //! - A launch ends with a checkpoint before its wall limit, also where steps are slow; a limit shorter than what ending takes
 //!   is an error; processes that are stopped for a while, or beyond their limit, do no harm.
 
-use formats::{exit, folder::RunFolder, journal::Event, lock};
+use formats::{checkpoint, exit, folder::RunFolder, journal::Event, lock};
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -16,7 +16,9 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime};
-use tests::{Output, WorkFolder, command, prepared, run};
+use tests::shim::{self, Fault};
+use tests::trial::{Trial, short};
+use tests::{Output, WorkFolder, command, prepared, run, run_within};
 
 /// A small column that goes on for as long as any test needs it.
 const ENDLESS: &str = r#"
@@ -322,6 +324,42 @@ fn launches_end_with_a_checkpoint_before_their_wall_limit() {
         let why = fs::read_to_string(folder.to_continue()).unwrap();
         assert!(why.contains("wall-limit"), "{why}");
         go(&folder, 0, &["--stop-after-steps", "1"], exit::RESUMABLE);
+    }
+}
+
+/// Every fsync of a checkpoint takes half a second, so ending takes 2.5 s, more than the two that are left in any case.
+#[test]
+fn a_slow_disk_is_reckoned_with() {
+    let work = WorkFolder::new();
+    let (folder, log) = (prepared(&work, "slow", ENDLESS, 1), work.join("log"));
+    let options = ["--wall-limit", "8s", "--checkpoint-every", "500ms"].map(OsStr::new);
+    let arguments = [&[folder.path().as_os_str()], &options[..]].concat();
+    let mut command = command("sph-run", &arguments, 0);
+    Fault::new("slow:500", 1).of("sync", "ckpt/*").put(&mut command, &shim::library(), folder.path(), &log).unwrap();
+    let began = Instant::now();
+    run_within(LONG, &mut command).expect(exit::RESUMABLE);
+    assert!(began.elapsed() < Duration::from_secs(8), "{:?}", began.elapsed());
+    assert_eq!(shim::struck(&log).len(), 1);
+    assert!(fs::read_to_string(folder.to_continue()).unwrap().contains("wall-limit"));
+    let newest = checkpoint::newest_manifest(&folder).unwrap().unwrap();
+    assert!(newest.generation > 1 && newest.write_seconds > 0.5, "{newest:?}");
+}
+
+#[test]
+fn the_time_of_day_may_jump() {
+    let trial = Trial::new(short::RINGS);
+    for (number, jump) in [-500_000_i64, 500_000].into_iter().enumerate() {
+        let (folder, log) = (trial.fresh(&format!("jump-{number}")), trial.work.join(format!("log-{number}")));
+        let options = ["--wall-limit", "10min", "--checkpoint-every", "40steps"].map(OsStr::new);
+        let mut command = command("sph-run", &[&[folder.path().as_os_str()], &options[..]].concat(), 2);
+        let fault = Fault::new(format!("clock:{jump}"), 60);
+        fault.put(&mut command, &shim::library(), folder.path(), &log).unwrap();
+        run_within(LONG, &mut command).expect(exit::DONE);
+        assert_eq!(shim::struck(&log).len(), 1);
+        let day = |event: &Event| event.at[..10].to_owned();
+        let events = Event::all(&folder);
+        assert_ne!(events.first().map(day), events.last().map(day), "it did not jump: {events:?}");
+        trial.same(&folder);
     }
 }
 

@@ -1,7 +1,9 @@
 //! No work is ever lost: whatever happens to a run, the same command goes on, and ends with the same bits.
 
+mod batch;
 mod faults;
 mod generations;
+mod golden;
 mod limits;
 mod outputs;
 mod scene;

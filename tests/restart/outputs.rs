@@ -123,3 +123,27 @@ fn a_stop_file_from_before_the_launch_does_not_stop_it() {
     assert!(!folder.stop().exists());
     trial.same(&folder);
 }
+
+/// Back to an archived checkpoint, also of a run that is done: what came after it is dropped and computed again.
+#[test]
+fn going_back_to_an_earlier_checkpoint() {
+    let trial = Trial::new(short::RINGS);
+    let folder = trial.fresh("back");
+    let options = ["--checkpoint-every", "40steps", "--checkpoint-keep", "1", "--checkpoint-archive", "2"];
+    trial.go(&folder, 2, &options, exit::DONE);
+    let generations = checkpoint::generations(&folder).unwrap();
+    assert!(generations.starts_with(&[2, 4]), "{generations:?}");
+    let before = state(folder.path());
+    let refused = launch(&folder, 1, &["--resume", "41"]).expect(exit::NO_INPUT);
+    assert!(refused.stderr.contains("no checkpoint of step 41; there are those of 80, 160"), "{refused}");
+    assert_eq!(state(folder.path()), before);
+
+    trial.go(&folder, 1, &["--resume", "80", "--stop-after-steps", "1"], exit::RESUMABLE);
+    assert!(!folder.done().exists());
+    assert_eq!(checkpoint::generations(&folder).unwrap(), [2, 3]);
+    assert!(folder.checkpoints().join("aside-000004-1").join("MANIFEST.json").exists());
+    let index = Index::read(&folder).unwrap().unwrap();
+    assert!(index.segments.iter().all(|segment| segment.step <= 81) && !folder.snapshot(3).exists());
+    trial.go(&folder, 3, &[], exit::DONE);
+    trial.same(&folder);
+}

@@ -9,15 +9,16 @@
 //! | `TALUS_FAULT_CALLS` | names of [`Kind`], with commas; all that change something where it is not set |
 //! | `TALUS_FAULT_FILES` | only paths in the folder of this form: `?` stands for one letter, `*` for any number of them |
 //! | `TALUS_FAULT_AT` | the number of the call, from 1, counted in each process on its own |
-//! | `TALUS_FAULT_DO` | `count`, `kill`, `torn`, `short`, `flip`, `suspend`, `sleep:MS`, `fail:CODE`, `fail-on:CODE` |
+//! | `TALUS_FAULT_DO` | `count`, `kill`, `torn`, `short`, `flip`, `suspend`, `sleep:MS`, `slow:MS`, `clock:S`, `fail:CODE`, `fail-on:CODE`, `full:CODE` |
 //!
-//! `torn`: killed after half of a write, or after the call; `short`: half is written, and said so; `fail-on`: at that call and all that
-//! follow; CODE as the system numbers it.
+//! `torn`: killed after half of a write, else after the call; `short`: half is written, and said so; `clock`: the time of
+//! day jumps so many seconds; `fail-on`, `slow`: at that call and all that follow; `full`: from there on no rank can write or allocate anything anywhere in the folder. CODE
+//! as the system numbers it.
 
 use crate::raw::{self, Place};
 use libc::c_int;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// What a call does.
@@ -78,8 +79,11 @@ enum Deed {
     Flip,
     Suspend,
     Sleep(Duration),
+    Slow(Duration),
+    Clock(i64),
     Fail(c_int),
     FailOn(c_int),
+    Full(c_int),
 }
 
 struct Plan {
@@ -97,12 +101,20 @@ struct Plan {
 
 static COUNTED: AtomicU64 = AtomicU64::new(0);
 static FAILING: AtomicBool = AtomicBool::new(false);
+/// Seconds that the time of day is off.
+static JUMPED: AtomicI64 = AtomicI64::new(0);
+
+/// How far the time of day has jumped, s.
+pub fn jumped() -> i64 {
+    JUMPED.load(Ordering::SeqCst)
+}
 
 /// Counts a call and says what is to be done with it. `bytes`: how many it writes or reads.
 pub fn judge(kind: Kind, place: Place, bytes: usize) -> Verdict {
     static PLAN: OnceLock<Option<Plan>> = OnceLock::new();
     let Some(plan) = PLAN.get_or_init(Plan::read) else { return Verdict::Go };
-    if !plan.calls.contains(&kind) {
+    let fills = matches!((plan.deed, kind), (Deed::Full(_), Kind::Write | Kind::Allocate));
+    if !fills && !plan.calls.contains(&kind) {
         return Verdict::Go;
     }
     let errno = raw::errno();
@@ -120,9 +132,6 @@ impl Plan {
         }
         let rank = ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"].iter().find_map(|name| std::env::var(name).ok());
         let rank = rank.map_or(Some(0), |rank| rank.parse().ok())?;
-        if variable("RANK").is_some_and(|wanted| wanted.parse() != Ok(rank)) {
-            return None;
-        }
         let calls = variable("CALLS").unwrap_or_default();
         let wanted = |(name, kind): &(&str, Kind)| match calls.as_str() {
             "" => !matches!(kind, Kind::Open | Kind::Read),
@@ -138,17 +147,28 @@ impl Plan {
             "flip" => Deed::Flip,
             "suspend" => Deed::Suspend,
             "sleep" => Deed::Sleep(Duration::from_millis(number.parse().ok()?)),
+            "slow" => Deed::Slow(Duration::from_millis(number.parse().ok()?)),
+            "clock" => Deed::Clock(number.parse().ok()?),
             "fail" => Deed::Fail(number.parse().ok()?),
             "fail-on" => Deed::FailOn(number.parse().ok()?),
+            "full" => Deed::Full(number.parse().ok()?),
             _ => return None,
         };
+        let mut at = variable("AT").and_then(|at| at.parse().ok()).unwrap_or(0);
+        if variable("RANK").is_some_and(|wanted| wanted.parse() != Ok(rank)) {
+            // A disk that gets full on one rank is so for all.
+            if !matches!(deed, Deed::Full(_)) {
+                return None;
+            }
+            at = u64::MAX;
+        }
         Some(Self {
             folder: variable("FOLDER")? + "/",
             log: variable("LOG")? + "\0",
             rank,
             calls: Kind::ALL.iter().filter(|kind| wanted(kind)).map(|(_, kind)| *kind).collect(),
             files: variable("FILES").unwrap_or_else(|| "*".into()),
-            at: variable("AT").and_then(|at| at.parse().ok()).unwrap_or(0),
+            at,
             deed,
             words,
         })
@@ -157,6 +177,14 @@ impl Plan {
     fn judge(&self, kind: Kind, place: Place, bytes: usize) -> Option<Verdict> {
         let path = place.path()?;
         let path = path.strip_prefix(&self.folder)?;
+        if let Deed::Full(code) = self.deed {
+            if matches!(kind, Kind::Write | Kind::Allocate) && raw::exists(&self.log) {
+                return Some(Verdict::Fail(code));
+            }
+            if !self.calls.contains(&kind) {
+                return None;
+            }
+        }
         if !fits(self.files.as_bytes(), path.as_bytes()) {
             return None;
         }
@@ -168,6 +196,9 @@ impl Plan {
         }
         if let (true, Deed::FailOn(code)) = (FAILING.load(Ordering::SeqCst), self.deed) {
             return Some(Verdict::Fail(code));
+        }
+        if let (true, Deed::Slow(time)) = (number > self.at, self.deed) {
+            std::thread::sleep(time);
         }
         if number != self.at {
             return None;
@@ -184,11 +215,15 @@ impl Plan {
                 raw::suspend();
                 None
             }
-            Deed::Sleep(time) => {
+            Deed::Clock(seconds) => {
+                JUMPED.store(seconds, Ordering::SeqCst);
+                None
+            }
+            Deed::Sleep(time) | Deed::Slow(time) => {
                 std::thread::sleep(time);
                 None
             }
-            Deed::Fail(code) => Some(Verdict::Fail(code)),
+            Deed::Fail(code) | Deed::Full(code) => Some(Verdict::Fail(code)),
             Deed::FailOn(code) => {
                 FAILING.store(true, Ordering::SeqCst);
                 Some(Verdict::Fail(code))

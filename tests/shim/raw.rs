@@ -57,6 +57,12 @@ pub fn append(path: &str, line: &str) {
     }
 }
 
+/// Is there a file of this name? `path` ends with a zero.
+pub fn exists(path: &str) -> bool {
+    // SAFETY: the path ends with a zero.
+    unsafe { libc::syscall(libc::SYS_faccessat, libc::AT_FDCWD, path.as_ptr(), libc::F_OK) == 0 }
+}
+
 /// Ends this process as `kill -9` does.
 pub fn kill() -> ! {
     loop {

@@ -39,6 +39,12 @@ pub fn program(name: &str) -> PathBuf {
     FOLDER.get_or_init(|| build(&["-p", "sph-prep", "-p", "sph-run", "-p", "sph-post"])).join(name)
 }
 
+/// Path of `workflows`, which `./talus` starts. As [`program`].
+pub fn workflows() -> PathBuf {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| build(&["-p", "workflows"])).join("workflows")
+}
+
 /// Has cargo build what the words say, in the profile and the target folder of the test; returns the profile's folder.
 fn build(what: &[&str]) -> PathBuf {
     let (target, folder) = target();

@@ -9,8 +9,8 @@ use std::{fs, io};
 /// One fault at one call. Calls are counted from 1, in each process on its own, among those the fault is about.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// What happens: `kill`, `torn`, `short`, `flip`, `suspend`, `sleep:MS`, `fail:CODE`, `fail-on:CODE`; `count` only
-    /// lists the calls. See `tests/shim/plan.rs`.
+    /// What happens: `kill`, `torn`, `short`, `flip`, `suspend`, `sleep:MS`, `slow:MS`, `clock:S`, `fail:CODE`, `fail-on:CODE`, `full:CODE`;
+    /// `count` only lists the calls. See `tests/shim/plan.rs`.
     pub deed: String,
     /// At which call.
     pub at: u64,

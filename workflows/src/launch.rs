@@ -42,14 +42,19 @@ pub fn cores() -> u32 {
 /// The command that starts `program` on `ranks` ranks: under the words of TALUS_MPIRUN (`srun --mpi=pmix`), else
 /// `mpirun`, which one rank does without.
 pub fn parallel<'a>(shell: &'a Shell, program: &Path, ranks: u32) -> Cmd<'a> {
-    let words = std::env::var("TALUS_MPIRUN").unwrap_or_default();
-    let words: Vec<&str> = words.split_whitespace().collect();
+    let words = launcher();
     let ranks_word = ranks.to_string();
     match words.split_first() {
         Some((launcher, options)) => cmd!(shell, "{launcher} {options...} -n {ranks_word} {program}"),
         None if ranks == 1 => cmd!(shell, "{program}"),
         None => cmd!(shell, "mpirun -n {ranks_word} {program}"),
     }
+}
+
+/// The words of TALUS_MPIRUN; none where it is not set.
+pub fn launcher() -> Vec<String> {
+    let words = std::env::var("TALUS_MPIRUN").unwrap_or_default();
+    words.split_whitespace().map(str::to_owned).collect()
 }
 
 /// How a program ended.

@@ -1,12 +1,15 @@
 //! Starts the stages of a run in order. `./talus` at the root of the repository hands its words to this program.
 
+mod batch;
 mod bench;
 mod cases;
 mod failure;
+mod faults;
 mod gate;
 mod launch;
 mod paths;
 mod stage;
+mod status;
 mod study;
 mod validate;
 
@@ -41,6 +44,22 @@ enum Command {
     },
     /// List the cases.
     Cases,
+    /// Run a case or a scene in slices: as jobs of Slurm, or as wall time on this machine (--local).
+    Batch {
+        /// Name of a case, path of a scene file that ends in .toml, or a run folder to go on with.
+        name: String,
+        #[command(flatten)]
+        options: Box<batch::Options>,
+    },
+    /// Say how far runs are: what is done, how much is left, when it ends.
+    Status {
+        /// Run folders.
+        #[arg(required = true, value_name = "RUN")]
+        runs: Vec<PathBuf>,
+        /// As a JSON array, for scripts.
+        #[arg(long)]
+        json: bool,
+    },
     /// Run the validation cases and hold them against published numbers; writes tests/validation/RESULTS.md.
     Validate {
         /// Folders under tests/validation; all where none is named.
@@ -63,6 +82,12 @@ enum Command {
     Bench {
         #[command(subcommand)]
         bench: bench::Bench,
+    },
+    /// Kill, starve and damage small runs some thousand times, and see whether any work is lost; writes
+    /// tests/faults/REPORT.md. Takes about an hour.
+    Faults {
+        #[command(flatten)]
+        options: faults::Options,
     },
     /// Run every test of the repository; ends with exit code 1 where one fails.
     Test {
@@ -106,10 +131,13 @@ fn carry_out(command: Command) -> Result<(), Failure> {
             run(&case, out.as_deref(), folder, how, &again)
         }
         Command::Cases => cases::list(),
+        Command::Batch { name, options } => batch::carry_out(&name, &options),
+        Command::Status { runs, json } => status::tell(&runs, json),
         Command::Validate { names, ranks, reuse } => validate::all(&names, ranks, reuse),
         Command::Study { name: None, .. } => study::list(),
         Command::Study { name: Some(name), options } => study::carry_out(&name, &options),
         Command::Bench { bench } => bench::carry_out(&bench),
+        Command::Faults { options } => faults::carry_out(&options),
         Command::Test { arguments } => gate::test(&arguments),
         Command::Help => {
             use clap::CommandFactory;
@@ -148,4 +176,24 @@ fn run(
         println!("{}", paths::short(&path).display());
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        Arguments::command().debug_assert();
+        let parse = |words: &str| Arguments::try_parse_from(format!("talus {words}").split(' '));
+        assert!(parse("batch x.toml --ranks 4 --chain 3 --sbatch-option=--mem=4G -- --mtbf 2h").is_ok());
+        assert!(parse("batch x.toml --local --slice 10min --slices 2 -- --quiet").is_ok());
+        for words in ["batch x --local", "batch x --slice 1min", "batch x --slurm --local --slice 1min", "status"] {
+            assert!(parse(words).is_err(), "{words}");
+        }
+        assert!(
+            parse("batch x --ranks 2 --time 4h").is_err() && parse("batch x --local --slice 9s --chain 2").is_err()
+        );
+    }
 }

@@ -71,6 +71,24 @@ impl Programs {
         Ok(Self { shell: launch::shell()?, folder: self.folder.clone() })
     }
 
+    /// Those that lie in a folder already, built elsewhere.
+    ///
+    /// # Errors
+    /// Where one of them is not there.
+    pub fn installed(folder: &Path) -> Result<Self, Failure> {
+        let folder = folder.canonicalize().map_err(|e| Failure::no_input(format!("{}: {e}", folder.display())))?;
+        let programs = Self { folder, shell: launch::shell()? };
+        match ["sph-prep", "sph-run", "sph-post"].iter().find(|name| !programs.path(name).is_file()) {
+            None => Ok(programs),
+            Some(name) => Err(Failure::no_input(format!("{}: there is no {name}", programs.folder.display()))),
+        }
+    }
+
+    /// Where they lie.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// Path of one of them.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
@@ -104,6 +122,14 @@ pub fn prepare(programs: &Programs, job: &Job) -> Result<(), Failure> {
 
 /// The stages after [`prepare`].
 pub fn compute(programs: &Programs, job: &Job) -> Result<(), Failure> {
+    if let Some(end) = advance(programs, job, &[])? {
+        passed("sph-run", end, job)?;
+    }
+    evaluate(programs, job)
+}
+
+/// Computes, with these options of sph-run besides, until it ends or stops; none where the run is done.
+pub fn advance(programs: &Programs, job: &Job, options: &[String]) -> Result<Option<launch::End>, Failure> {
     let folder = RunFolder::new(job.folder);
     let name = paths::short(job.folder).display().to_string();
     let changes = changes(&folder, job)?;
@@ -112,21 +138,25 @@ pub fn compute(programs: &Programs, job: &Job) -> Result<(), Failure> {
     }
     if folder.done().is_file() && changes.is_empty() {
         say(job, &format!("{name} is done: only the results are made again (--fresh starts over)"));
-    } else {
-        let header = snapshot::read_header(&folder.initial()).map_err(|e| Failure {
-            code: e.exit_code(),
-            message: format!("{e}; start over with: {} --fresh", job.again),
-        })?;
-        let ranks = launch::ranks(job.ranks, header.count);
-        let plural = if ranks == 1 { "" } else { "s" };
-        say(job, &format!("sph-run on {ranks} rank{plural}, {} particles", header.count));
-        let command = launch::parallel(&programs.shell, &programs.path("sph-run"), ranks).arg(job.folder);
-        let command = match changes.is_empty() {
-            true => command,
-            false => command.arg("--scene").arg(job.scene),
-        };
-        passed("sph-run", launch::wait_with(command, Stop::Gently, job.log)?, job)?;
+        return Ok(None);
     }
+    let header = snapshot::read_header(&folder.initial()).map_err(|e| Failure {
+        code: e.exit_code(),
+        message: format!("{e}; start over with: {} --fresh", job.again),
+    })?;
+    let ranks = launch::ranks(job.ranks, header.count);
+    let plural = if ranks == 1 { "" } else { "s" };
+    say(job, &format!("sph-run on {ranks} rank{plural}, {} particles", header.count));
+    let command = launch::parallel(&programs.shell, &programs.path("sph-run"), ranks).arg(job.folder).args(options);
+    let command = match changes.is_empty() {
+        true => command,
+        false => command.arg("--scene").arg(job.scene),
+    };
+    launch::wait_with(command, Stop::Gently, job.log).map(Some)
+}
+
+/// The last stage: results from what was computed.
+pub fn evaluate(programs: &Programs, job: &Job) -> Result<(), Failure> {
     say(job, "sph-post");
     let post = programs.path("sph-post");
     let command = cmd!(programs.shell, "{post}").arg(job.folder);
@@ -161,7 +191,8 @@ fn sph_prep(programs: &Programs, job: &Job) -> Result<(), Failure> {
     passed("sph-prep", launch::wait_with(command, Stop::AtOnce, job.log)?, job)
 }
 
-fn is_occupied(folder: &Path) -> bool {
+/// Is there anything in a folder?
+pub fn is_occupied(folder: &Path) -> bool {
     folder.exists() && std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_some())
 }
 
@@ -209,7 +240,7 @@ fn remove(folder: &RunFolder) -> Result<(), Failure> {
 
 /// Hands on the exit code of a stage that failed, with the command that goes on. mpirun answers SIGTERM with
 /// status 1 whatever its ranks say, so a stop on request is told by the request.
-fn passed(stage: &str, end: launch::End, job: &Job) -> Result<(), Failure> {
+pub fn passed(stage: &str, end: launch::End, job: &Job) -> Result<(), Failure> {
     if end.status.success() {
         return Ok(());
     }

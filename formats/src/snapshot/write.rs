@@ -1,8 +1,8 @@
 //! Writing a particle file, by all ranks together.
 //!
 //! ```text
-//! rank 0      makes the file alone: groups, attributes, and contiguous datasets whose places are fixed once it is closed
-//! rank 0      has the system allocate every byte of it (a full disk is found out here)
+//! rank 0      makes the file alone, in memory: groups, attributes, and contiguous datasets, empty, whose places are fixed
+//! rank 0      has the system allocate every byte of it (a full disk is found out here), and copies what is not empty
 //! every rank  writes its rows at their places, and waits until they are on the disk
 //! rank 0      renames the file
 //! ```
@@ -111,25 +111,17 @@ struct Places {
     types: u64,
 }
 
-/// Rank 0: makes the file with everything in it but the rows, and has room made for those.
+/// Rank 0: makes the file with everything in it but the rows, and has room made for those. HDF5 does so in memory: on a
+/// disk that fails it would leave a file it cannot close, and crash at the end of the program.
 fn make(temporary: &Path, header: &Header, kept: Kept) -> Result<Places, FileError> {
-    let needed = bytes_needed(header.count, kept);
-    disk::reserve(temporary, needed)?;
-    let refused = |error: hdf5::Error| refused(temporary, needed, &error);
-    let file = h5::create(temporary).map_err(refused)?;
+    disk::reserve(temporary, bytes_needed(header.count, kept))?;
+    let refused = |error: hdf5::Error| FileError::cannot_write(temporary, error);
+    let (memory, file) = disk::in_memory(h5::create).map_err(|error| FileError::cannot_write(temporary, error))?;
+    let file = file.map_err(refused)?;
     let places = lay_out(&file, header, kept).map_err(refused)?;
     file.close().map_err(refused)?;
-    disk::allocate(temporary)?;
+    disk::copy_sparse(&memory, temporary)?;
     Ok(places)
-}
-
-fn refused(path: &Path, needed: u64, error: &hdf5::Error) -> FileError {
-    let what = error.to_string();
-    if what.contains("No space left") || what.contains("quota") {
-        FileError::DiskFull { path: path.display().to_string(), needed }
-    } else {
-        FileError::cannot_write(path, what)
-    }
 }
 
 fn lay_out(file: &hdf5::File, header: &Header, kept: Kept) -> hdf5::Result<Places> {

@@ -1,0 +1,4 @@
+//! A real Slurm, started by the test itself.
+
+mod cluster;
+mod slices;
