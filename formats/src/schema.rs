@@ -26,7 +26,7 @@ impl Rank {
 }
 
 /// Which files hold a field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Kept {
     /// Snapshots for people, and checkpoints.
     Everywhere,

@@ -11,7 +11,9 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 use tests::shim::{self, Fault, library};
-use tests::trial::{HANGS, Trial, appears, launch, meanwhile, newest, processes, short, signal, strike, while_running};
+use tests::trial::{
+    HANGS, Trial, appears, calls, copy, launch, meanwhile, newest, processes, short, signal, strike, while_running,
+};
 use tests::{Output, command, left_out, program, run_within};
 
 const STATE: &str = "ckpt/gen-??????.tmp/state.hdf.tmp";
@@ -108,6 +110,43 @@ fn written_wrongly() {
         let check = launch(&folder, 0, &["--check"]).expect(exit::NO_INPUT);
         assert!(check.stdout.contains("out/snapshot-"), "{struck:?}: {check}");
     }
+}
+
+/// Of the particles at the start or in going on, on any rank: noticed, and not taken for particles.
+#[test]
+fn reads_that_fail() {
+    let fails = |at, kind: &str, files: &str| Fault::new(format!("fail:{}", libc::EIO), at).of(kind, files);
+    let trial = Trial::in_memory(short::RINGS);
+    let folder = trial.fresh("reads");
+    let failed = |ranks: usize, fault: Fault, file: &str| {
+        let (output, struck) = strike(&folder, ranks, &OFTEN, &fault);
+        assert_eq!(output.code, exit::NO_INPUT, "{struck:?}: {output}");
+        assert!(output.stderr.contains(file), "{struck:?}: {output}");
+    };
+    // The last open is for the rows, and so are the last reads.
+    let opens = |file: &str, rank: usize| {
+        let copied = copy(&folder, "counted");
+        let calls = calls(&copied, 3, &["--stop-after-steps", "0"], "open,read", exit::RESUMABLE);
+        fs::remove_dir_all(copied.path()).unwrap();
+        let count =
+            |kind: &str| calls.iter().filter(|c| c.rank == rank && c.kind == kind && c.path == file).count() as u64;
+        (count("open"), count("read"))
+    };
+    let (open, read) = opens("initial.hdf", 1);
+    assert!(open > 0 && read > 5);
+    failed(3, fails(open, "open", "initial.hdf").on(1), "initial.hdf");
+    for number in [read - 4, read] {
+        failed(3, fails(number, "read", "initial.hdf").on(1), "initial.hdf");
+    }
+    failed(0, fails(read, "read", "initial.hdf"), "initial.hdf");
+    trial.go(&folder, 2, &["--stop-after-steps", "50"], exit::RESUMABLE);
+    let state = "ckpt/gen-000001/state.hdf";
+    let (open, read) = opens(state, 2);
+    assert!(open > 0 && read > 5);
+    failed(3, fails(open, "open", state).on(2), state);
+    failed(3, fails(read - 2, "read", state).on(2), state);
+    trial.go(&folder, 3, &[], exit::DONE);
+    trial.same(&folder);
 }
 
 /// Runs a shell script in a mount namespace of its own, where `$1` is a folder a disk can be mounted on; `None`, and

@@ -3,12 +3,11 @@
 //! A collective call that fails on one rank only would leave the others waiting for ever. [`agree`] ends every
 //! collective step: all ranks learn whether all succeeded, and all return the same error.
 
-pub(crate) mod collective;
 pub(crate) mod text;
 
 use crate::snapshot::FileError;
 use mpi::collective::SystemOperation;
-use mpi::traits::{AsRaw, Communicator as _, CommunicatorCollectives, Root};
+use mpi::traits::{Communicator as _, CommunicatorCollectives, Root};
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::Path;
 
@@ -77,10 +76,4 @@ pub(crate) fn create(path: &Path) -> hdf5::Result<hdf5::File> {
         // No times in the file: equal contents give equal bytes.
         .with_fcpl(|creation| creation.obj_track_times(false))
         .create(path)
-}
-
-/// Collective: opens the file at `path` for reading by all ranks.
-pub(crate) fn open(path: &Path, comm: &Communicator) -> hdf5::Result<hdf5::File> {
-    let communicator = comm.as_raw();
-    hdf5::File::with_options().with_fapl(|access| access.mpio(communicator, None)).open(path)
 }

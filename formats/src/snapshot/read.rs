@@ -1,15 +1,19 @@
 //! Reading a particle file, alone or by all ranks together, and naming its contents.
+//!
+//! HDF5 says what is where; the rows are read past it, by each rank on its own. HDF5 over MPI-IO takes no notice of a
+//! read that fails, and hands out what was in memory before.
 
 use super::digest::Sums;
 use super::{ColumnMut, Digests, FORMAT_VERSION, FileError, Header, Rows, content_name, fields_of, share};
-use crate::h5::collective::{self, Transfer};
 use crate::h5::{self, Communicator, text};
 use crate::schema::{Field, Kept, Rank};
 use crate::{kernel::Kernel, space::Space};
 use hdf5::{Dataset, Group};
 use mpi::traits::Communicator as _;
+use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
-use std::io::Read;
+use std::io::{self, Read};
+use std::os::unix::fs::FileExt;
 use std::{fs, ops::Range, path::Path};
 
 /// How every HDF5 file begins.
@@ -18,11 +22,13 @@ const SIGNATURE: [u8; 8] = *b"\x89HDF\r\n\x1a\n";
 /// Rows read at a time where a file is only passed through.
 const PASS: u64 = 1 << 16;
 
-/// A particle file, open and with a layout that was checked.
-struct Open {
+/// What a particle file says of itself, checked.
+#[derive(Serialize, Deserialize)]
+struct Layout {
     header: Header,
     kept: Kept,
-    fields: Vec<(&'static Field, Dataset)>,
+    /// Where the datasets begin, in the order of the fields.
+    places: Vec<u64>,
 }
 
 /// Reads what a particle file says of itself, and checks that its datasets have the shapes it says. Serial.
@@ -31,7 +37,7 @@ struct Open {
 /// `NotFound`, `CannotRead`; `WrongKind` for what is no particle file; `Newer`, `Older`; `Damaged` for one that is cut off or
 /// changed.
 pub fn read_header(path: &Path) -> Result<Header, FileError> {
-    open(path).map(|open| open.header)
+    examine(path).map(|layout| layout.header)
 }
 
 /// Reads a whole particle file. Serial. Fields the file does not hold stay empty.
@@ -39,10 +45,10 @@ pub fn read_header(path: &Path) -> Result<Header, FileError> {
 /// # Errors
 /// As [`read_header`]; also `Damaged` where ids are not 0, 1, 2 .. or a number is not finite.
 pub fn read(path: &Path) -> Result<(Header, Rows), FileError> {
-    let open = open(path)?;
-    let rows = open.rows(path, 0..open.header.count, Transfer::Alone)?;
-    check(path, &rows, open.kept)?;
-    Ok((open.header, rows))
+    let layout = examine(path)?;
+    let rows = layout.rows(path, 0..layout.header.count)?;
+    check(path, &rows, layout.kept)?;
+    Ok((layout.header, rows))
 }
 
 /// Collective: reads the rows of `range`, which may be another on every rank, overlap, or be empty.
@@ -50,20 +56,18 @@ pub fn read(path: &Path) -> Result<(Header, Rows), FileError> {
 /// # Errors
 /// As [`read`], the same on all ranks; `Damaged` if a range reaches past the last row.
 pub fn read_rows(path: &Path, range: Range<u64>, comm: &Communicator) -> Result<(Header, Rows), FileError> {
-    // Rank 0 looks alone first: a damaged file must not meet a collective call.
-    let header = h5::from_root(comm, || read_header(path))?;
-    let inside = range.start <= range.end && range.end <= header.count;
-    let past = || FileError::damaged(path, format!("rows {range:?} were asked for, it has {}", header.count));
-    h5::agree(comm, if inside { Ok(()) } else { Err(past()) })?;
-
-    let file = h5::agree(comm, h5::open(path, comm).map_err(|error| FileError::damaged(path, error)))?;
-    let open = h5::agree(comm, examine(path, &file))?;
-    let rows = h5::agree(comm, open.rows(path, range, Transfer::Together));
-    let Open { header, kept, fields } = open;
-    drop(fields);
-    h5::agree(comm, file.close().map_err(|error| FileError::damaged(path, error)))?;
-    let rows = rows?;
-    h5::agree(comm, check(path, &rows, kept))?;
+    let layout = h5::from_root(comm, || examine(path))?;
+    let count = layout.header.count;
+    let read = || {
+        if range.start > range.end || range.end > count {
+            return Err(FileError::damaged(path, format!("rows {range:?} were asked for, it has {count}")));
+        }
+        let rows = layout.rows(path, range.clone())?;
+        check(path, &rows, layout.kept)?;
+        Ok(rows)
+    };
+    let rows = h5::agree(comm, read())?;
+    let header = layout.header;
     Ok((header, rows))
 }
 
@@ -72,15 +76,15 @@ pub fn read_rows(path: &Path, range: Range<u64>, comm: &Communicator) -> Result<
 /// # Errors
 /// As [`read_header`]. Values are not judged.
 pub fn digests(path: &Path) -> Result<(Header, Digests), FileError> {
-    let open = open(path)?;
-    let mut sums = Sums::new(open.kept);
+    let layout = examine(path)?;
+    let mut sums = Sums::new(layout.kept);
     let mut first = 0;
-    while first < open.header.count {
-        let end = open.header.count.min(first + PASS);
-        sums.add(&open.rows(path, first..end, Transfer::Alone)?);
+    while first < layout.header.count {
+        let end = layout.header.count.min(first + PASS);
+        sums.add(&layout.rows(path, first..end)?);
         first = end;
     }
-    Ok((open.header, sums.finish()))
+    Ok((layout.header, sums.finish()))
 }
 
 /// One digest for a whole particle file: its header and its numbers. Serial.
@@ -110,8 +114,8 @@ fn check(path: &Path, rows: &Rows, kept: Kept) -> Result<(), FileError> {
     rows.fault(kept).map_or(Ok(()), |what| Err(FileError::damaged(path, what)))
 }
 
-/// Opens a file for this process alone.
-fn open(path: &Path) -> Result<Open, FileError> {
+/// Reads the header and finds the datasets.
+fn examine(path: &Path) -> Result<Layout, FileError> {
     let reading = |error| FileError::reading(path, &error);
     let metadata = fs::metadata(path).map_err(reading)?;
     if metadata.is_dir() {
@@ -134,11 +138,6 @@ fn open(path: &Path) -> Result<Open, FileError> {
         }
         FileError::damaged(path, what)
     })?;
-    examine(path, &file)
-}
-
-/// Reads the header and finds the datasets. Under MPI all ranks do the same.
-fn examine(path: &Path, file: &hdf5::File) -> Result<Open, FileError> {
     let foreign = |what: &str| FileError::wrong_kind(path, format!("it is HDF5, but {what}"));
     let sph = file.group("sph").map_err(|_| foreign("has no group /sph; a particle file of talus is needed"))?;
     let version: u64 = sph
@@ -153,14 +152,13 @@ fn examine(path: &Path, file: &hdf5::File) -> Result<Open, FileError> {
     }
     let damaged = |what: hdf5::Error| FileError::damaged(path, what);
     let (header, kept) = header(&sph).map_err(damaged)?;
-    let length = fs::metadata(path).map_err(|error| FileError::reading(path, &error))?.len();
-    let mut fields = Vec::new();
+    let mut places = Vec::new();
     for field in fields_of(kept) {
         let dataset = file.dataset(&format!("particles/{}", field.name)).map_err(damaged)?;
-        check_dataset(field, &dataset, header.count, length).map_err(|what| FileError::damaged(path, what))?;
-        fields.push((field, dataset));
+        let place = check_dataset(field, &dataset, header.count, metadata.len());
+        places.push(place.map_err(|what| FileError::damaged(path, what))?);
     }
-    Ok(Open { header, kept, fields })
+    Ok(Layout { header, kept, places })
 }
 
 fn header(sph: &Group) -> hdf5::Result<(Header, Kept)> {
@@ -199,8 +197,8 @@ fn header(sph: &Group) -> hdf5::Result<(Header, Kept)> {
     Ok((header, kept))
 }
 
-/// Has a dataset the type and shape of its field, and does it lie within the file?
-fn check_dataset(field: &Field, dataset: &Dataset, count: u64, length: u64) -> Result<(), String> {
+/// Where a dataset begins; it must have the type and shape of its field, and lie within the file in one piece.
+fn check_dataset(field: &Field, dataset: &Dataset, count: u64, length: u64) -> Result<u64, String> {
     let name = field.name;
     let components = field.rank.components();
     let shape = dataset.shape();
@@ -220,52 +218,48 @@ fn check_dataset(field: &Field, dataset: &Dataset, count: u64, length: u64) -> R
         return Err(format!("/particles/{name} has another type of number"));
     }
     let bytes = 8 * components as u64 * count;
-    let end = dataset.offset().and_then(|offset| offset.checked_add(bytes));
-    match end {
-        Some(end) if end <= length => Ok(()),
-        _ => Err(format!("/particles/{name} reaches past the end of the file")),
+    let within = |offset: &u64| offset.checked_add(bytes).is_some_and(|end| end <= length);
+    match dataset.offset().filter(within) {
+        Some(offset) => Ok(offset),
+        None => Err(format!("/particles/{name} reaches past the end of the file")),
     }
 }
 
-impl Open {
+impl Layout {
     /// The rows of `range`, all columns.
-    fn rows(&self, path: &Path, range: Range<u64>, transfer: Transfer) -> Result<Rows, FileError> {
+    fn rows(&self, path: &Path, range: Range<u64>) -> Result<Rows, FileError> {
         let mut rows = Rows { first: range.start, ..Rows::default() };
-        // A rank goes on after a failure, so that the others do not wait for it in the next transfer.
-        let mut outcome = Ok(());
-        for (field, dataset) in &self.fields {
-            let read = read_column(&mut rows, field, dataset, range.clone(), transfer);
-            outcome = outcome.and(read.map_err(|error| FileError::damaged(path, error)));
-        }
-        outcome.map(|()| rows)
+        let read = || {
+            let file = fs::File::open(path)?;
+            for (field, place) in fields_of(self.kept).zip(&self.places) {
+                let width = field.rank.components() as u64;
+                let numbers = read_numbers(&file, place + 8 * width * range.start, width * (range.end - range.start))?;
+                fill(rows.column_mut(field), &numbers);
+            }
+            Ok(rows)
+        };
+        read().map_err(|error: io::Error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => FileError::damaged(path, "it ends within its rows"),
+            _ => FileError::reading(path, &error),
+        })
     }
 }
 
-fn read_column(
-    rows: &mut Rows,
-    field: &Field,
-    dataset: &Dataset,
-    range: Range<u64>,
-    transfer: Transfer,
-) -> hdf5::Result<()> {
-    let first = range.start;
-    let count = (range.end - range.start) as usize;
-    match rows.column_mut(field) {
-        ColumnMut::Whole(values) => {
-            values.resize(count, 0);
-            collective::read_rows(dataset, first, values, transfer)
-        }
-        ColumnMut::Scalar(values) => {
-            values.resize(count, 0.0);
-            collective::read_rows(dataset, first, values, transfer)
-        }
-        ColumnMut::Vector(values) => {
-            values.resize(count, [0.0; 3]);
-            collective::read_rows(dataset, first, values.as_flattened_mut(), transfer)
-        }
-        ColumnMut::Symmetric(values) => {
-            values.resize(count, [0.0; 6]);
-            collective::read_rows(dataset, first, values.as_flattened_mut(), transfer)
-        }
+/// So many numbers from a place on, as bytes.
+fn read_numbers(file: &fs::File, place: u64, count: u64) -> io::Result<Vec<[u8; 8]>> {
+    let mut numbers = vec![[0; 8]; count as usize];
+    file.read_exact_at(numbers.as_flattened_mut(), place)?;
+    Ok(numbers)
+}
+
+fn fill(column: ColumnMut<'_>, numbers: &[[u8; 8]]) {
+    fn tuples<const N: usize>(numbers: &[[u8; 8]]) -> Vec<[f64; N]> {
+        numbers.chunks_exact(N).map(|row| std::array::from_fn(|i| f64::from_ne_bytes(row[i]))).collect()
+    }
+    match column {
+        ColumnMut::Whole(values) => *values = numbers.iter().map(|&bytes| u64::from_ne_bytes(bytes)).collect(),
+        ColumnMut::Scalar(values) => *values = numbers.iter().map(|&bytes| f64::from_ne_bytes(bytes)).collect(),
+        ColumnMut::Vector(values) => *values = tuples(numbers),
+        ColumnMut::Symmetric(values) => *values = tuples(numbers),
     }
 }

@@ -41,6 +41,8 @@ pub struct Ground {
     pub took: Vec<Duration>,
     /// Stopped with three generations.
     pub stopped: PathBuf,
+    /// All calls of a launch that goes on there, of one rank and of three.
+    pub calls_after: [Vec<Call>; 2],
 }
 
 /// The three of them.
@@ -82,7 +84,9 @@ fn make(programs: &Programs, work: &Path, name: &'static str, scene: &str) -> Re
         launcher::run(launcher::sph_run(&programs.sph_run, &stopped, 1, &options), &stopped, |_, _| {})?,
         exit::RESUMABLE,
     )?;
-    Ok(Ground { name, fresh, outputs, calls, all_calls, took, stopped })
+    let one = count(programs, work, &stopped, &format!("{name}-after-1"), 1, ALL)?.1;
+    let three = count(programs, work, &stopped, &format!("{name}-after-3"), 3, ALL)?.1;
+    Ok(Ground { name, fresh, outputs, calls, all_calls, took, stopped, calls_after: [one, three] })
 }
 
 /// Runs without a fault, and counts.

@@ -21,8 +21,9 @@ pub struct Trial {
 /// What is done.
 #[derive(Clone, Debug)]
 pub enum What {
-    /// A fault at a call, and the exit codes that are right; none: any but success.
-    Call { fault: Fault, codes: Vec<i32> },
+    /// A fault at a call, and the exit codes that are right; none: any but success. In a run that goes on, or one that
+    /// begins.
+    Call { fault: Fault, codes: Vec<i32>, goes_on: bool },
     /// SIGKILL from outside, after this part of a run's time, to this rank or, where it is none, to all and mpirun.
     Moment { part: f64, rank: Option<usize> },
     /// The newest generation's file is cut off.
@@ -89,7 +90,7 @@ fn kills(options: &Options, grounds: &[Ground]) -> Vec<Trial> {
             ground,
             ranks,
             ranks_after: after(call.number),
-            what: What::Call { fault: Fault::new(deed, call.number).on(call.rank), codes: Vec::new() },
+            what: What::Call { fault: Fault::new(deed, call.number).on(call.rank), codes: Vec::new(), goes_on: false },
         }
     };
     let points = options.kills - moments;
@@ -126,12 +127,13 @@ fn failing(grounds: &[Ground]) -> Vec<Trial> {
     let mut trials = Vec::new();
     let ground = &grounds[0];
     let mut put = |group: &str, ranks: usize, number: u64, fault: Fault, codes: &[i32]| {
+        let goes_on = group == "resume";
         trials.push(Trial {
             name: format!("{group} plane {ranks} ranks, rank {} call {number}", fault.rank.unwrap_or(0)),
             ground: 0,
             ranks,
             ranks_after: after(number),
-            what: What::Call { fault, codes: codes.to_vec() },
+            what: What::Call { fault, codes: codes.to_vec(), goes_on },
         });
     };
     for (ranks, every) in [(1, 1), (3, 10)] {
@@ -149,10 +151,20 @@ fn failing(grounds: &[Ground]) -> Vec<Trial> {
             }
         }
     }
-    let reads = ground.all_calls.iter().filter(|call| ["open", "read"].contains(&&*call.kind)).count();
-    for number in 1..=reads as u64 {
-        let fails = Fault::new(format!("fail:{EIO}"), number).of("open,read", "*");
-        put("read", 1, number, fails, &[DONE, CANNOT_WRITE, NO_INPUT]);
+    let read = |call: &&Call| ["open", "read"].contains(&&*call.kind);
+    let fails = |number, rank| Fault::new(format!("fail:{EIO}"), number).of("open,read", "*").on(rank);
+    for number in 1..=ground.all_calls.iter().filter(read).count() as u64 {
+        put("read", 1, number, fails(number, 0), &[DONE, CANNOT_WRITE, NO_INPUT]);
+    }
+    // Reads before the first step are those of what the run goes on from.
+    for (ranks, calls) in [1, 3].into_iter().zip(&ground.calls_after) {
+        for rank in 0..ranks {
+            let own = calls.iter().filter(|call| call.rank == rank).filter(read);
+            let before = own.take_while(|call| !call.path.contains(".tmp")).count();
+            for number in 1..=before as u64 {
+                put("resume", ranks, number, fails(number, rank), &[DONE, NO_INPUT]);
+            }
+        }
     }
     trials
 }

@@ -19,12 +19,13 @@ const FINDINGS: [(&str, &str); 6] = [
 ];
 
 /// Groups of trials: how their names begin, and what was done.
-const GROUPS: [(&str, &str); 7] = [
+const GROUPS: [(&str, &str); 8] = [
     ("kill", "SIGKILL"),
     ("full", "no room from a write or allocation on"),
     ("disk", "a real disk that is too small"),
     ("io", "an I/O error in a call that changes something"),
     ("read", "an I/O error in opening or reading"),
+    ("resume", "the same in going on from a checkpoint"),
     ("cut", "a generation's file cut off at a border of 4 KiB"),
     ("flip", "a bit changed in a dataset, an attribute or the manifest"),
 ];

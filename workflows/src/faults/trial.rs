@@ -53,8 +53,9 @@ impl Attempt<'_> {
     }
 
     fn at_a_call(&self) -> Result<Outcome, Failure> {
-        let What::Call { fault, codes } = &self.trial.what else { return Ok(Outcome::default()) };
-        launcher::copy(&self.ground.fresh, self.folder.path())?;
+        let What::Call { fault, codes, goes_on } = &self.trial.what else { return Ok(Outcome::default()) };
+        let from = if *goes_on { &self.ground.stopped } else { &self.ground.fresh };
+        launcher::copy(from, self.folder.path())?;
         let mut command = self.command(self.trial.ranks, &HABITS);
         let log = self.log();
         put(fault, &mut command, self.programs, self.folder.path(), &log)?;
