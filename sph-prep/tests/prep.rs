@@ -116,6 +116,8 @@ fn prep(ranks: usize, arguments: &[&str]) -> Output {
         mpirun.args(["-n", &ranks.to_string(), binary]);
         mpirun
     };
+    // mpirun waits two seconds for ranks that have failed, although they have ended by themselves.
+    command.env("OMPI_MCA_odls_base_sigkill_timeout", "0");
     // Two jobs bound to the same cores would wait for each other.
     command.env("OMPI_MCA_hwloc_base_binding_policy", "none");
     let mut child =

@@ -73,7 +73,14 @@ pub struct Cli {
     /// How long a lock of another machine is watched before it counts as left behind.
     #[arg(long, hide = true, default_value = "75s", value_parser = duration)]
     pub lock_patience: Duration,
+
+    /// How long MPI may take to start.
+    #[arg(long, hide = true, default_value = "10min", value_parser = duration)]
+    pub mpi_patience: Duration,
 }
+
+/// The default of `--mpi-patience`.
+pub const MPI_PATIENCE: Duration = Duration::from_secs(600);
 
 /// How often checkpoints are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,6 +4,10 @@ use crate::cli::WallLimit;
 use crate::scheduler;
 use std::time::{Duration, Instant, SystemTime};
 
+/// What a job needs after this program has ended: mpirun waits a while for ranks that end with a code, and the script has
+/// something to say.
+const AFTERWARDS: Duration = Duration::from_secs(5);
+
 /// The end of a launch, as rank 0 knows it; on other ranks there is none.
 #[derive(Clone, Debug, Default)]
 pub struct Deadline {
@@ -32,7 +36,7 @@ impl Deadline {
                     let left = humantime::format_duration(Duration::from_secs(allowance.left.as_secs()));
                     eprintln!("sph-run: the job has {left} left ({})", allowance.source);
                 }
-                (Instant::now(), found.allowance.map(|allowance| allowance.left))
+                (Instant::now(), found.allowance.map(|allowance| allowance.left.saturating_sub(AFTERWARDS)))
             }
         };
         let at = left.and_then(|left| from.checked_add(left));

@@ -32,7 +32,7 @@ pub enum RunError {
     CannotWrite { path: PathBuf, message: String },
     #[error("{}: the run has begun\nhelp: leave --new out to resume it, or choose another folder", .path.display())]
     HasBegun { path: PathBuf },
-    #[error("{}: end.time: {end} s has passed: the run is at {time} s", .path.display())]
+    #[error("{}: end.time: {end} s has passed: the run is at {time} s; a later end is needed", .path.display())]
     EndHasPassed { path: PathBuf, end: f64, time: f64 },
     #[error("{0}, or --wall-limit none")]
     LimitTooShort(String),

@@ -7,7 +7,7 @@ use formats::provenance::{self, Entry};
 use formats::scene::Scene;
 use formats::{exit, lock};
 use mpi::traits::Communicator as _;
-use sph_run::cli::Cli;
+use sph_run::cli::{self, Cli};
 use sph_run::deadline::Deadline;
 use sph_run::error::RunError;
 use sph_run::limits::Limits;
@@ -17,7 +17,8 @@ use sph_run::run::{Outcome, Run};
 use sph_run::{check, dispatch, scheduler};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
 
 fn main() {
     let begun = Instant::now();
@@ -26,10 +27,13 @@ fn main() {
     if let Ok(Cli { check: true, run, .. }) = &cli {
         std::process::exit(check::report(&RunFolder::new(run)));
     }
+    let patience = cli.as_ref().map_or(cli::MPI_PATIENCE, |cli| cli.mpi_patience);
+    let starting = end_unless_started_within(patience);
     let Some(universe) = mpi::initialize() else {
         eprintln!("sph-run: MPI can't be initialised");
         std::process::exit(exit::USAGE);
     };
+    drop(starting);
     let comm = universe.world();
     abort_all_ranks_on_panic();
     let code = match cli {
@@ -43,6 +47,22 @@ fn main() {
     };
     drop(universe);
     std::process::exit(code);
+}
+
+/// Ends this process where MPI does not come up until what is returned is dropped: a rank that is killed or stopped as it
+/// starts may leave the others waiting for ever, and with them the whole job. Nothing has been done by then.
+fn end_unless_started_within(patience: Duration) -> mpsc::Sender<()> {
+    let (starting, wait) = mpsc::channel();
+    std::thread::spawn(move || {
+        if wait.recv_timeout(patience) == Err(mpsc::RecvTimeoutError::Timeout) {
+            let seconds = patience.as_secs();
+            eprintln!(
+                "sph-run: MPI has not started within {seconds} s: a rank is missing; the same command tries again"
+            );
+            signal_hook::low_level::exit(exit::RESUMABLE);
+        }
+    });
+    starting
 }
 
 /// A rank that panics while others wait for it would hang the job.

@@ -80,7 +80,7 @@ impl Start {
                 let message = String::from("its manifest lacks the clock");
                 let clock = clock_from_json(&manifest.clock, manifest.step)
                     .ok_or_else(|| RunError::Input { path: state.clone(), message })?;
-                let over = manifest.clock["over"].as_bool().unwrap_or(false);
+                let over = is_over(&manifest);
                 let past = Past { outputs: manifest.outputs, write_seconds: Some(manifest.write_seconds) };
                 (Self { scene, particles: state, clock, over }, past, Some(manifest.scene))
             }
@@ -112,7 +112,7 @@ impl Start {
             let _ = Event { what: change.to_string(), ..event }.append(folder);
         }
         let scene = Scene::read(&folder.scene().display().to_string(), &self.scene)?;
-        self.over = false;
+        self.over &= scene.end.time <= self.clock.time;
         if !self.fresh() {
             self.clock.line_event = Output::first_after(scene.output.history, self.clock.time);
             self.clock.snapshot_event = Output::first_after(scene.output.snapshots, self.clock.time);
@@ -164,7 +164,7 @@ fn changed_scene(folder: &RunFolder, prepared: String, path: &Path) -> Result<St
         return Ok(prepared);
     }
     if let Some(manifest) = checkpoint::newest_manifest(folder)?
-        && manifest.time > scene.end.time
+        && (manifest.time > scene.end.time || manifest.time == scene.end.time && !is_over(&manifest))
     {
         let (end, time) = (scene.end.time, manifest.time);
         return Err(RunError::EndHasPassed { path: path.into(), end, time });
@@ -178,6 +178,11 @@ fn compare(folder: &RunFolder, then: &str, now: &str) -> Result<Vec<Change>, Run
         true => Ok(Vec::new()),
         false => Ok(Scene::changes(&folder.scene().display().to_string(), then, now)?),
     }
+}
+
+/// Was it written at the end of a run?
+fn is_over(manifest: &checkpoint::Manifest) -> bool {
+    manifest.clock["over"].as_bool().unwrap_or(false)
 }
 
 /// The clock in a manifest, and whether the run is over. Floats are stored as their bits: decimal text would be a

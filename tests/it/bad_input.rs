@@ -7,9 +7,10 @@ use std::{
     ffi::OsString,
     fs,
     path::{Path, PathBuf},
+    process::Command,
     time::Duration,
 };
-use tests::{Output, WorkFolder, command, prepared, run, run_within};
+use tests::{Output, WorkFolder, command, ends_by_itself, prepared, run, run_within};
 
 /// Nothing here computes anything: what takes longer hangs.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -137,11 +138,16 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
     found
 }
 
+/// Runs a command that should fail in a folder.
+fn within(folder: &Path, command: &mut Command) -> Output {
+    run_within(PATIENCE, ends_by_itself(command.current_dir(folder)))
+}
+
 /// Runs a program on wrong input and checks everything but the place.
 #[track_caller]
 fn refused(work: &WorkFolder, program: &str, arguments: &[OsString], ranks: usize, code: i32) -> String {
     let before = contents(work.path());
-    let output: Output = run_within(PATIENCE, command(program, arguments, ranks).current_dir(work.path()));
+    let output: Output = within(work.path(), &mut command(program, arguments, ranks));
     let said = format!("{program} {arguments:?} on {ranks} ranks: {output}");
     assert!(!output.timed_out, "hangs: {said}");
     assert_eq!(output.code, code, "{said}");
@@ -381,7 +387,7 @@ fn damaged_in(program: &str, name: &str, damage: impl Fn(&RunFolder), code: i32,
     damage(&folder);
     for ranks in RANKS {
         let before = contents(folder.path());
-        let output = run_within(PATIENCE, command(program, &["run"], ranks).current_dir(work.path()));
+        let output = within(work.path(), &mut command(program, &["run"], ranks));
         let said = format!("{program}, {name} on {ranks} ranks: {output}");
         assert!(!output.timed_out, "hangs: {said}");
         assert_eq!(output.code, code, "{said}");

@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime};
 use tests::shim::{self, Fault};
-use tests::trial::{Trial, short};
+use tests::trial::{Trial, running, short};
 use tests::{Output, WorkFolder, command, prepared, run, run_within};
 
 /// A small column that goes on for as long as any test needs it.
@@ -325,6 +325,25 @@ fn launches_end_with_a_checkpoint_before_their_wall_limit() {
         assert!(why.contains("wall-limit"), "{why}");
         go(&folder, 0, &["--stop-after-steps", "1"], exit::RESUMABLE);
     }
+}
+
+/// A rank that is stopped before MPI is up keeps all others waiting in there: they end by themselves.
+#[test]
+fn a_start_that_hangs_ends() {
+    let work = WorkFolder::new();
+    let folder = prepared(&work, "run", ENDLESS, 1);
+    let mut launch = Launch::start(&folder, 3, &["--mpi-patience", "3s"]);
+    let ranks = || running(folder.path(), "sph-run");
+    wait_for("a rank", || !ranks().is_empty());
+    for rank in ranks() {
+        let _ = Command::new("kill").args(["-STOP", &rank.to_string()]).status();
+    }
+    assert!(launch.runs());
+    let ended = launch.end();
+    assert!(ended.code != exit::DONE && ended.stderr.contains("MPI has not started within 3 s"), "{ended}");
+    assert!(!folder.out().exists() && !folder.lock().exists());
+    assert!(ranks().is_empty(), "some are left");
+    go(&folder, 2, &["--stop-after-steps", "1"], exit::RESUMABLE);
 }
 
 /// Every fsync of a checkpoint takes half a second, so ending takes 2.5 s, more than the two that are left in any case.

@@ -51,7 +51,7 @@ fn five_slices_leave_the_bytes_of_an_uninterrupted_run() {
     let folder = RunFolder::new(work.join("a run"));
 
     // While there is the file `slow` a checkpoint at every step makes the run last; a job that finds the file `limit`
-    // takes it away and has to end 9 s from then.
+    // takes it away and has to end 12 s from then.
     let mpirun = work.join("bin/mpirun");
     fs::create_dir(work.join("bin")).unwrap();
     let slow = work.write("slow", "");
@@ -66,7 +66,7 @@ fn five_slices_leave_the_bytes_of_an_uninterrupted_run() {
     let setup = format!(
         "PATH={:?}:$PATH
 if rm {limit:?} 2>/dev/null; then
-    scontrol update jobid=\"$SLURM_JOB_ID\" EndTime=\"$(date -d '+9 sec' +%Y-%m-%dT%H:%M:%S)\"
+    scontrol update jobid=\"$SLURM_JOB_ID\" EndTime=\"$(date -d '+12 sec' +%Y-%m-%dT%H:%M:%S)\"
     SLURM_JOB_END_TIME=$(date -d \"$(squeue --noheader --jobs=\"$SLURM_JOB_ID\" --format=%e)\" +%s)
     export SLURM_JOB_END_TIME
 fi
@@ -97,9 +97,15 @@ fi
         cluster.wait_for(job, "Restarts", |value| value == restarts);
         cluster.wait_for(job, "JobState", |value| value == "PENDING");
     };
-    // A job that was put back waits two minutes otherwise.
-    let now = |job: &str| cluster.ask("scontrol", &["update", &format!("jobid={job}"), "StartTime=now"]).expect(0);
-
+    // A job that was put back waits two minutes otherwise. Slurm may set that time a moment later: so again and again.
+    let now = |job: &str| {
+        let started = appears(Duration::from_secs(60), || {
+            cluster.ask("scontrol", &["update", &format!("jobid={job}"), "StartTime=now"]);
+            std::thread::sleep(Duration::from_millis(300));
+            cluster.job(job, "JobState") == "RUNNING"
+        });
+        assert!(started, "job {job} does not start: {}", cluster.logs());
+    };
     let cancel = |job: &str| {
         cluster.ask("scancel", &[job]).expect(0);
         cluster.wait_for(job, "JobState", |value| value == "CANCELLED");

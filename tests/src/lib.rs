@@ -152,7 +152,13 @@ impl std::fmt::Display for Output {
 
 /// Runs one of the three programs on a number of ranks; 0: without mpirun.
 pub fn run<A: AsRef<OsStr>>(name: &str, arguments: &[A], ranks: usize) -> Output {
-    run_within(TIME_LIMIT, &mut command(name, arguments, ranks))
+    run_within(TIME_LIMIT, ends_by_itself(&mut command(name, arguments, ranks)))
+}
+
+/// For a command that nobody stops half way: where it fails, mpirun does not wait two seconds for ranks that are to end, as it
+/// does otherwise. They have ended by themselves: all leave together, after what they had to say.
+pub fn ends_by_itself(command: &mut Command) -> &mut Command {
+    command.env("OMPI_MCA_odls_base_sigkill_timeout", "0")
 }
 
 /// The command [`run`] would start, for tests that change its environment or stop it half way.
@@ -169,6 +175,12 @@ pub fn command<A: AsRef<OsStr>>(name: &str, arguments: &[A], ranks: usize) -> Co
     // As .cargo/config.toml has it, for tests that are not started by cargo.
     for name in ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMPI_MCA_rmaps_base_oversubscribe"] {
         command.env(name, "1");
+    }
+    // As `./talus test` has it, for tests that it did not start.
+    for (name, value) in [("OMPI_MCA_pml", "ob1"), ("OMPI_MCA_mpi_yield_when_idle", "1")] {
+        if std::env::var_os(name).is_none() {
+            command.env(name, value);
+        }
     }
     // Two jobs bound to the same cores would wait for each other.
     command.env("OMPI_MCA_hwloc_base_binding_policy", "none");

@@ -284,6 +284,13 @@ pub fn appears(limit: Duration, so: impl Fn() -> bool) -> bool {
 /// # Panics
 /// If there is none.
 pub fn processes(folder: &Path, program: &str) -> Vec<u32> {
+    let found = running(folder, program);
+    assert!(!found.is_empty(), "no {program} runs in {}", folder.display());
+    found
+}
+
+/// As [`processes`], where there may be none.
+pub fn running(folder: &Path, program: &str) -> Vec<u32> {
     let numbers = fs::read_dir("/proc").unwrap().filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
     let matches = |pid: &u32| {
         let Ok(line) = fs::read(format!("/proc/{pid}/cmdline")) else { return false };
@@ -291,9 +298,7 @@ pub fn processes(folder: &Path, program: &str) -> Vec<u32> {
         let name = Path::new(OsStr::from_bytes(arguments[0])).file_name();
         name == Some(OsStr::new(program)) && arguments.contains(&folder.as_os_str().as_bytes())
     };
-    let found: Vec<u32> = numbers.filter(matches).collect();
-    assert!(!found.is_empty(), "no {program} runs in {}", folder.display());
-    found
+    numbers.filter(matches).collect()
 }
 
 /// Sends a signal, by its name without SIG, to a process that is there.

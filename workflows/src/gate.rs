@@ -6,10 +6,19 @@ use xshell::{Cmd, cmd};
 /// Exit code of `test` where a test fails or does not build, whatever code the test runner has for it.
 const TESTS_FAILED: i32 = 1;
 
+/// Settings of Open MPI for tests, where the environment has none. All ranks are on this machine: the search for fast networks
+/// would take most of the time that MPI needs to start, and ranks that wait should leave the cores to other tests.
+const SETTINGS: [(&str, &str); 2] = [("OMPI_MCA_pml", "ob1"), ("OMPI_MCA_mpi_yield_when_idle", "1")];
+
 /// Runs the whole workspace's tests; `arguments` go to the test runner. cargo-nextest leaves the examples in the
 /// documentation to `cargo test`. Fails with exit code 1.
 pub fn test(arguments: &[String]) -> Result<(), Failure> {
     let shell = launch::shell()?;
+    let _settings: Vec<_> = SETTINGS
+        .into_iter()
+        .filter(|(name, _)| std::env::var_os(name).is_none())
+        .map(|(name, value)| shell.push_env(name, value))
+        .collect();
     let cargo = stage::cargo();
     let nextest = cmd!(shell, "{cargo} nextest --version").quiet().ignore_stdout().ignore_stderr().run().is_ok();
     if nextest {

@@ -3,6 +3,7 @@
 use super::script::{GoOn, Script};
 use crate::{failure::Failure, launch, paths};
 use formats::{disk, exit, folder::RunFolder};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use xshell::{Shell, cmd};
 
@@ -117,7 +118,8 @@ pub fn submit(folder: &RunFolder, script: &Script, wishes: &Wishes) -> Result<()
     disk::write_atomic(&file, text.as_bytes()).map_err(|e| Failure { code: e.exit_code(), message: e.to_string() })?;
     let shown = super::script::shell_word(&file.display().to_string());
     if wishes.dry_run {
-        print!("{text}");
+        // Nobody to tell where the reader has gone.
+        let _ = std::io::stdout().write_all(text.as_bytes());
         eprintln!("talus: nothing is submitted; by hand: sbatch {shown}");
         return Ok(());
     }

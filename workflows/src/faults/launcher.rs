@@ -51,7 +51,8 @@ pub fn sph_run(program: &Path, folder: &Path, ranks: usize, options: &[&str]) ->
     if let Some(work) = folder.parent() {
         command.env("OMPI_MCA_btl_vader_backing_directory", work);
     }
-    command.arg(folder).args(options);
+    // Ranks that wait for one that was killed as MPI started: well before that counts as a hang.
+    command.arg(folder).args(["--mpi-patience", "30s"]).args(options);
     command
 }
 

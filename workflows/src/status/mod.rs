@@ -9,6 +9,7 @@ use formats::lock::{self, Holder};
 use formats::{checkpoint, outputs::Index, scene::Scene, snapshot};
 use serde::{Deserialize, Serialize};
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -105,13 +106,15 @@ pub fn tell(runs: &[PathBuf], json: bool) -> Result<(), Failure> {
     let looks: Vec<_> = runs.iter().map(|run| Status::of(&RunFolder::new(paths::from_caller(run)))).collect();
     let (found, failed): (Vec<_>, Vec<_>) = looks.into_iter().partition(Result::is_ok);
     let found: Vec<Status> = found.into_iter().flatten().collect();
-    if json {
-        let text = serde_json::to_string_pretty(&found).map_err(|e| Failure::cannot_write(e.to_string()))?;
-        println!("{text}");
-    } else {
-        let shown: Vec<_> = found.iter().map(|status| text::long(status, SystemTime::now())).collect();
-        print!("{}", shown.join("\n"));
-    }
+    let text = match json {
+        true => serde_json::to_string_pretty(&found).map_err(|e| Failure::cannot_write(e.to_string()))? + "\n",
+        false => {
+            let shown: Vec<_> = found.iter().map(|status| text::long(status, SystemTime::now())).collect();
+            shown.join("\n")
+        }
+    };
+    // Nobody to tell where the reader has gone.
+    let _ = std::io::stdout().write_all(text.as_bytes());
     let messages: Vec<_> = failed.into_iter().filter_map(Result::err).map(|failure| failure.message).collect();
     match messages.is_empty() {
         true => Ok(()),
