@@ -103,8 +103,8 @@ pub(crate) fn in_memory<T>(open: impl FnOnce(&Path) -> T) -> io::Result<(File, T
     Ok((file, opened))
 }
 
-/// Makes the file at `path`, which is there, a copy of another. Every byte gets its place on the disk, so that writing them later
-/// cannot fail for want of room; but only what is no hole in the original is written.
+/// Makes the file at `path`, which is there, a copy of another. Every byte gets its place on the disk, so that writing
+/// them later cannot fail for want of room; but only what is no hole in the original is written.
 pub(crate) fn copy_sparse(original: &File, path: &Path) -> Result<(), FileError> {
     let fault = |needed, error: io::Error| FileError::writing(path, needed, &error);
     let length = original.metadata().map_err(|e| fault(0, e))?.len();

@@ -1,8 +1,8 @@
 //! - Always one valid generation: killed at any call of a commit and at random moments, on one rank or all, a run
 //!   goes on without a person, loses at most one interval, and ends with the same bits.
 //! - Any number of ranks goes on from any other, and checkpoints perturb nothing, however often they are written.
-//! - What is cut off, changed or mixed up is found and named; the generation before is used, or none is left and the exit
-//!   code says so.
+//! - What is cut off, changed or mixed up is found and named; the generation before is used, or none is left and the
+//!   exit code says so.
 //! - An older generation goes only after a newer one has been read back and published.
 
 use formats::folder::RunFolder;

@@ -62,8 +62,8 @@ pub fn draw(seed: u64, place: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// A third at random moments; the others first at every call of one rank in the first scene, then spread evenly over the
-/// calls of all ranks of all launches.
+/// A third at random moments; the others first at every call of one rank in the first scene, then spread evenly over
+/// the calls of all ranks of all launches.
 fn kills(options: &Options, grounds: &[Ground]) -> Vec<Trial> {
     let moments = options.kills / 3;
     let mut trials: Vec<Trial> = (0..moments as u64)
