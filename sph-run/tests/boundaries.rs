@@ -99,8 +99,7 @@ fn by_id<const D: usize, const N: usize>(p: &Particles<D, N>) -> Vec<usize> {
 /// What MPI allows once a process, for all tests of this file that need a run.
 #[test]
 fn runs() {
-    let universe = mpi::initialize().expect("MPI starts");
-    let comm = universe.world();
+    let (_turn, comm) = crate::support::alone();
     d4_a_block_that_leaves_comes_in_again_as_it_was(&comm);
     the_answer_does_not_know_where_the_border_is(&comm);
     what_gets_behind_a_mirror_is_put_back(&comm);

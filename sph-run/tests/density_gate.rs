@@ -1,12 +1,10 @@
 //! The cures of the volume ratchet: row F12 of the list of scenes where methods fail. A density below which nothing carries,
 //! and a mean stress that follows from the density.
 
-mod support;
-
+use crate::support::{Random, close, root_j2};
 use formats::scene::{Cone, DruckerPrager as Sand, MeanStress, Rotation};
 use sph_run::algebra::Sym;
 use sph_run::material::{DruckerPrager, History, Increment, Material};
-use support::{Random, close, root_j2};
 
 const DENSITY: f64 = 2600.0;
 

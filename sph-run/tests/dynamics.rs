@@ -1,8 +1,7 @@
 //! Motion of free bodies over many periods, and limits of the time step: rows C14, D2 and D5 of the list of verification
 //! problems; C13 with corrected gradients. The stepper is driven directly, on one rank.
 
-mod support;
-
+use crate::support::{Random, alone};
 use formats::scene::{Material as Law, Scene};
 use formats::snapshot::Rows;
 use sph_run::algebra::Vector;
@@ -13,7 +12,6 @@ use sph_run::simulation::{Clock, Parameters, Simulation};
 use sph_run::space::Space;
 use sph_run::timestep::Requests;
 use std::f64::consts::{PI, TAU};
-use support::{Random, alone};
 
 /// Spacing, m, and density, kg/m3.
 const DX: f64 = 0.01;

@@ -1,8 +1,7 @@
 //! When neighbour lists are built, and with them copies and images, changes no bit of the answer: also where particles cross
 //! planes of symmetry in between, and with everything on that a scene may switch on.
 
-mod support;
-
+use crate::support::{Random, alone};
 use formats::scene::Scene;
 use sph_run::dispatch::{Job, resolve};
 use sph_run::particles::{Particles, id, key};
@@ -10,7 +9,6 @@ use sph_run::physics::Physics;
 use sph_run::simulation::{Clock, Simulation};
 use sph_run::timestep::Requests;
 use std::collections::BTreeMap;
-use support::{Random, alone};
 
 const SIDE: usize = 6;
 const LAWS: [&str; 3] = [

@@ -1,13 +1,11 @@
 //! The mu(I) law at a material point, against closed forms: rows B1-B4 of the list of verification problems, the elastic
 //! solid below yield, and the partially regularised curve.
 
-mod support;
-
+use crate::support::{Random, close, root_j2, stress};
 use formats::scene::{Material as Law, MuI as Grains, Scene};
 use sph_run::algebra::Sym;
 use sph_run::material::mu_i::Friction;
 use sph_run::material::{History, Increment, Material, MuI};
-use support::{Random, close, root_j2, stress};
 
 const DENSITY: f64 = 1500.0;
 const SOUND_SPEED: f64 = 20.0;

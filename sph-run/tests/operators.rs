@@ -1,8 +1,7 @@
 //! The pair operators on lattices and jittered blocks, against closed forms: rows C1-C5 and C8-C11 of the list of
 //! verification problems.
 
-mod support;
-
+use crate::support::block;
 use formats::kernel::Kernel as Kind;
 use sph_run::algebra::{Matrix, Sym, Vector};
 use sph_run::neighbors::Neighbors;
@@ -12,7 +11,6 @@ use sph_run::rates::momentum::{Viscosity, momentum};
 use sph_run::rates::velocity_gradient::velocity_gradient;
 use sph_run::space::{Axisymmetric, PlaneStrain, Space, ThreeD};
 use sph_run::sweep::Pairs;
-use support::block;
 
 struct Swept<const D: usize> {
     gradient: Vec<Matrix<D>>,

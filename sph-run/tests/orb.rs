@@ -415,9 +415,10 @@ fn over_mpi() {
     if std::env::var_os(MARK).is_none() {
         for size in ["1", "2", "3", "5"] {
             let mut mpirun = std::process::Command::new("mpirun");
-            mpirun.args(["-n", size]).arg(std::env::current_exe().unwrap()).args(["--exact", "over_mpi"]);
+            mpirun.args(["-n", size]).arg(std::env::current_exe().unwrap()).args(["--exact", "orb::over_mpi"]);
             let output = mpirun.env(MARK, size).output().expect("mpirun starts");
-            assert!(output.status.success(), "{size} ranks: {}", String::from_utf8_lossy(&output.stdout));
+            let said = String::from_utf8_lossy(&output.stdout);
+            assert!(output.status.success() && said.contains("1 passed"), "{size} ranks: {said}");
         }
         return;
     }

@@ -1,8 +1,7 @@
 //! What operators and walls make of smooth fields: rows C6, C7 and C15 of the list of verification problems, and E2 under
 //! a load that grows slowly, which no scene can ask for.
 
-mod support;
-
+use crate::support::{Random, alone, block};
 use formats::scene::Scene;
 use formats::snapshot::Rows;
 use sph_run::algebra::{Matrix, Vector};
@@ -17,7 +16,6 @@ use sph_run::simulation::{Clock, Simulation};
 use sph_run::space::{PlaneStrain, Space};
 use sph_run::timestep::Requests;
 use std::f64::consts::TAU;
-use support::{Random, alone, block};
 
 /// Spacing, m: a power of two, so that periods of whole spacings are exact.
 const DX: f64 = 0.0078125;

@@ -1,8 +1,7 @@
 //! The operators a scene may switch on, on lattices and jittered blocks: corrected gradients (rows C5, C9, C10 of the list
 //! of verification problems, by the solver's own tensor), viscosities (C11), diffusion (C12), artificial stress, shifting.
 
-mod support;
-
+use crate::support::{Random, block, close};
 use sph_run::algebra::{Matrix, Sym, Vector};
 use sph_run::material::Mean;
 use sph_run::neighbors::Neighbors;
@@ -14,7 +13,6 @@ use sph_run::rates::velocity_gradient::velocity_gradient;
 use sph_run::rates::{artificial_stress, diffusion, shifting, viscosity};
 use sph_run::space::{Axisymmetric, PlaneStrain, Space, ThreeD};
 use sph_run::sweep::Pairs;
-use support::{Random, block, close};
 
 /// Smoothing length over the spacing, which is 1.
 const H: f64 = 1.2;

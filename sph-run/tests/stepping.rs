@@ -95,8 +95,7 @@ fn c13_the_leap_frog_is_stable_up_to_its_limit() {
     type Plane = Model<PlaneStrain, CubicSpline, DruckerPrager>;
     type PlaneOfWendland = Model<PlaneStrain, WendlandC2, DruckerPrager>;
     type Rings = Model<Axisymmetric, CubicSpline, DruckerPrager>;
-    let universe = mpi::initialize().expect("MPI starts");
-    let comm = universe.world();
+    let (_turn, comm) = crate::support::alone();
     // Theory 1.84 and 1.87 h/c (wave number of the largest frequency on the infinite lattice); these free blocks have
     // their limits between 1.86 and 1.88. Brackets of 3 %, and the two values of the row.
     for courant in [1.7, 1.82] {

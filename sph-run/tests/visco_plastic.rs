@@ -1,11 +1,9 @@
 //! The visco-plastic law of Szewc (2017) at a material point, against closed forms.
 
-mod support;
-
+use crate::support::{Random, close, root_j2, stress};
 use formats::scene::{self, ViscousOperator};
 use sph_run::algebra::Sym;
 use sph_run::material::{History, Increment, Material, Mean, ViscoPlastic};
-use support::{Random, close, root_j2, stress};
 
 const DENSITY: f64 = 1850.0;
 const DT: f64 = 1e-5;

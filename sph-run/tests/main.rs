@@ -1,0 +1,17 @@
+//! Tests of the solver, in one binary: the steps of all laws, kernels and spaces are compiled once.
+
+mod boundaries;
+mod density_gate;
+mod dynamics;
+mod halo;
+mod lists;
+mod material;
+mod momentum;
+mod mu_i;
+mod operators;
+mod orb;
+mod resolution;
+mod stabilisers;
+mod stepping;
+mod support;
+mod visco_plastic;
