@@ -3,7 +3,6 @@
 use clap::Parser;
 use formats::folder::RunFolder;
 use formats::h5::Communicator;
-use formats::provenance::{self, Entry};
 use formats::scene::Scene;
 use formats::{exit, lock};
 use mpi::traits::Communicator as _;
@@ -115,8 +114,6 @@ fn run(
     let start = share_text(comm, || {
         Ok(match Start::find(folder, cli, comm.size() as u64)? {
             Some((start, then)) => {
-                // For people: that it can't be noted is no reason not to run.
-                let _ = provenance::append(&folder.provenance(), Entry::this("sph-run", comm.size() as usize));
                 past = then;
                 start.to_json().to_string()
             }

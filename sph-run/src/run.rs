@@ -20,6 +20,7 @@ use formats::folder::RunFolder;
 use formats::h5::{self, Communicator};
 use formats::journal::{self, Event};
 use formats::lock::{LockError, RunLock};
+use formats::provenance::{self, Entry};
 use formats::scene::Scene;
 use formats::schema::Kept;
 use formats::snapshot::FileError;
@@ -113,8 +114,11 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         let mut over = self.outputs_due()?;
         agree(self.job.comm, || {
             self.check_wall_limit()?;
-            // From here on the run is under way.
-            let _ = std::fs::remove_file(self.job.folder.to_continue());
+            // From here on the run is under way. Who computes is for people: not to be able to note it is no fault.
+            let folder = self.job.folder;
+            let _ = std::fs::remove_file(folder.to_continue());
+            let ranks = self.job.comm.size() as usize;
+            let _ = provenance::append(&folder.provenance(), Entry::this("sph-run", ranks));
             Ok(())
         })?;
         while !over {
