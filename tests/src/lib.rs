@@ -36,13 +36,13 @@ pub fn target() -> (PathBuf, PathBuf) {
 /// tests in other processes waiting meanwhile.
 pub fn program(name: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| build(&["-p", "sph-prep", "-p", "sph-run", "-p", "sph-post"])).join(name)
+    FOLDER.get_or_init(|| build(&["--bins"])).join(name)
 }
 
 /// Path of `workflows`, which `./talus` starts. As [`program`].
 pub fn workflows() -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| build(&["-p", "workflows"])).join("workflows")
+    FOLDER.get_or_init(|| build(&["--bins"])).join("workflows")
 }
 
 /// Has cargo build what the words say, in the profile and the target folder of the test; returns the profile's folder.
@@ -54,7 +54,8 @@ fn build(what: &[&str]) -> PathBuf {
     };
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)
-        .args(["build", "--quiet", "--profile", profile])
+        // With the features of the whole workspace, as the tests are built: nothing is built twice.
+        .args(["build", "--quiet", "--workspace", "--profile", profile])
         .args(what)
         .arg("--target-dir")
         .arg(target)

@@ -112,5 +112,5 @@ pub fn struck(log: &Path) -> Vec<String> {
 /// The library, built by the first call in the profile and the target folder of the test.
 pub fn library() -> PathBuf {
     static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
-    LIBRARY.get_or_init(|| crate::build(&["-p", "tests", "--example", "shim"]).join("examples/libshim.so")).clone()
+    LIBRARY.get_or_init(|| crate::build(&["--example", "shim"]).join("examples/libshim.so")).clone()
 }

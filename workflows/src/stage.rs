@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use xshell::{Shell, cmd};
 
-/// The three programs, built in release.
+/// The three programs.
 #[derive(Debug)]
 pub struct Programs {
     shell: Shell,
@@ -37,25 +37,26 @@ pub struct Job<'a> {
 }
 
 impl Programs {
-    /// Builds them next to this program: in `release/` of the target folder it was built in.
+    /// Builds them beside this program, in its own profile: `release` where `./talus` started it.
     pub fn build() -> Result<Self, Failure> {
         let shell = launch::shell()?;
         let own = std::env::current_exe().map_err(|e| Failure::no_input(format!("cannot find this program: {e}")))?;
-        let target = own
-            .parent()
-            .and_then(Path::parent)
-            .ok_or_else(|| Failure::no_input(format!("{}: not in a target folder", own.display())))?;
-        let programs = Self { folder: target.join("release"), shell };
+        let lost = || Failure::no_input(format!("{}: not in a target folder", own.display()));
+        let folder = own.parent().ok_or_else(lost)?;
+        let target = folder.parent().ok_or_else(lost)?;
+        // As this program itself was built: by `./talus`, or with the tests of the whole workspace.
+        let what: &[&str] = match folder.ends_with("release") {
+            true => &["--release", "-p", "sph-prep", "-p", "sph-run", "-p", "sph-post"],
+            false => &["--workspace", "--bins"],
+        };
+        let programs = Self { folder: folder.to_path_buf(), shell };
         let built = ["sph-prep", "sph-run", "sph-post"].iter().all(|name| programs.path(name).is_file());
         if !built {
             eprintln!("talus: building sph-prep, sph-run and sph-post");
         }
         let quiet = built.then_some("--quiet");
         let cargo = cargo();
-        let build = cmd!(
-            programs.shell,
-            "{cargo} build {quiet...} --release --target-dir {target} -p sph-prep -p sph-run -p sph-post"
-        );
+        let build = cmd!(programs.shell, "{cargo} build {quiet...} --target-dir {target} {what...}");
         let end = launch::wait(build, Stop::AtOnce)?;
         match end.status.success() {
             true => Ok(programs),
