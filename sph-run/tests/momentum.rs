@@ -40,7 +40,12 @@ fn h7_each_pair_counts_once_on_each_side() {
         for size in ["1", "2", "3", "5"] {
             let mut mpirun = std::process::Command::new("mpirun");
             mpirun.args(["-n", size]).arg(std::env::current_exe().unwrap());
-            mpirun.args(["--exact", "momentum::h7_each_pair_counts_once_on_each_side", "--nocapture"]);
+            mpirun.args([
+                "--exact",
+                "momentum::h7_each_pair_counts_once_on_each_side",
+                "--nocapture",
+                "--test-threads=1",
+            ]);
             let output = mpirun.env(MARK, size).output().expect("mpirun starts");
             let said = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
             let passed = output.status.success() && said[0].contains("1 passed");
