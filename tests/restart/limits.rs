@@ -335,9 +335,7 @@ fn a_start_that_hangs_ends() {
     let mut launch = Launch::start(&folder, 3, &["--mpi-patience", "3s"]);
     let ranks = || running(folder.path(), "sph-run");
     wait_for("a rank", || !ranks().is_empty());
-    for rank in ranks() {
-        let _ = Command::new("kill").args(["-STOP", &rank.to_string()]).status();
-    }
+    let _ = Command::new("kill").args(["-STOP", &ranks()[0].to_string()]).status();
     assert!(launch.runs());
     let ended = launch.end();
     assert!(ended.code != exit::DONE && ended.stderr.contains("MPI has not started within 3 s"), "{ended}");
