@@ -31,7 +31,7 @@ pub const FORMAT_VERSION: u64 = 2;
 pub struct Header {
     /// The scene's title.
     pub title: String,
-    /// SHA-256 of the scene's text.
+    /// Of what of the scene may not change while a run goes on: [`crate::scene::Scene::hash`].
     pub scene_hash: String,
     /// Space.
     pub space: Space,
