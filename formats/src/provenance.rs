@@ -4,7 +4,7 @@ use crate::{disk, snapshot::FileError};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::io::{self, Read};
+use std::io;
 use std::{fs, path::Path, time::SystemTime};
 
 /// The program as it was built, and the libraries it runs with.
@@ -111,25 +111,6 @@ pub(crate) fn host() -> String {
 /// SHA-256 of `bytes`, as 64 lower-case hexadecimal digits.
 pub fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
-}
-
-/// SHA-256 of a file's bytes, read piece by piece.
-///
-/// # Errors
-/// `NotFound`, `CannotRead`.
-pub fn sha256_file(path: &Path) -> Result<String, FileError> {
-    let reading = |error| FileError::reading(path, &error);
-    let mut file = fs::File::open(path).map_err(reading)?;
-    let mut hash = Sha256::new();
-    let mut buffer = vec![0u8; 1 << 20];
-    loop {
-        match file.read(&mut buffer) {
-            Ok(0) => return Ok(hex(&hash.finalize())),
-            Ok(length) => hash.update(&buffer[..length]),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(reading(error)),
-        }
-    }
 }
 
 /// Bytes as lower-case hexadecimal digits.

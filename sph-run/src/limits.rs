@@ -78,12 +78,7 @@ impl Limits {
         Self { signalled, stop_file: folder.stop(), looked: Instant::now(), found: false }
     }
 
-    /// Was this rank asked to stop? Looks for the file at most twice a second, and only where `may_look`.
-    pub fn stop(&mut self, may_look: bool) -> bool {
-        self.reason(may_look).is_some()
-    }
-
-    /// As [`Limits::stop`], and by whom.
+    /// Was this rank asked to stop, and by whom? Looks for the file at most twice a second, and only where `may_look`.
     pub fn reason(&mut self, may_look: bool) -> Option<Reason> {
         if may_look && !self.found && self.looked.elapsed() > Duration::from_millis(500) {
             self.looked = Instant::now();
@@ -131,7 +126,7 @@ mod tests {
         wait();
         assert_eq!(limits.reason(false), None);
         assert_eq!(limits.reason(true), Some(Reason::StopFile));
-        assert!(limits.stop(false));
+        assert!(limits.reason(false).is_some());
         assert!(clear_stale_stop_file(&folder) && !folder.stop().exists());
         let mut limits = Limits::new(Arc::default(), &folder);
         wait();

@@ -2,14 +2,13 @@
 //!
 //! All times are durations since the start of the launch by a monotonic clock: the time of day may jump.
 
+use formats::checkpoint;
 use std::time::Duration;
 
 /// The first checkpoint of a run comes after this, so that the cost of one is known early.
 pub const FIRST_CHECKPOINT: Duration = Duration::from_secs(60);
 /// What a stop takes besides steps and writes: agreeing, closing files, leaving MPI.
 const LEAVING: f64 = 2.0;
-/// Writing takes at most one part in this many of a run: 5 %.
-const LEAST_SHARE: f64 = 20.0;
 /// The longest step is forgotten by this factor a step, the longest write a write.
 const STEP_FADES: f64 = 0.999;
 const WRITE_FADES: f64 = 0.9;
@@ -53,26 +52,15 @@ impl Pace {
         self.cost = Some(self.cost.map_or(took, |cost| 0.5 * (cost + took)));
     }
 
-    /// What a checkpoint costs: measured, else stated by an earlier launch.
-    pub fn checkpoint_cost(&self) -> Option<Duration> {
-        self.cost.or(self.stated_cost).map(Duration::from_secs_f64)
-    }
-
-    /// Computing time between two checkpoints on a machine that fails every `mtbf` on average: [`optimum`], but never so
-    /// short that writing takes more than 5 % of the time.
+    /// Computing time between two checkpoints on a machine that fails every `mtbf` on average, by [`checkpoint::interval`].
     pub fn checkpoint_interval(&self, mtbf: Duration) -> Duration {
         let Some(cost) = self.cost.or(self.stated_cost) else { return FIRST_CHECKPOINT };
-        Duration::from_secs_f64(optimum(cost, mtbf.as_secs_f64()).max((LEAST_SHARE - 1.0) * cost))
+        Duration::from_secs_f64(checkpoint::interval(cost, mtbf.as_secs_f64()))
     }
 
     /// How long before a limit a run must begin to stop: a step, a snapshot that falls due in it, the checkpoint.
     pub fn margin(&self) -> Duration {
         Duration::from_secs_f64(self.longest_step + 2.0 * self.longest_write + LEAVING)
-    }
-
-    /// Must the run stop now to be done with its checkpoint by `deadline`?
-    pub fn must_stop(&self, now: Duration, deadline: Duration) -> bool {
-        now.saturating_add(self.margin()) >= deadline
     }
 
     /// Can a launch begin with this much time?
@@ -93,20 +81,10 @@ impl Pace {
     }
 }
 
-/// Computing time between checkpoints that makes a run end soonest where writing one takes `delta` and failures come
-/// every `m` on average: J. T. Daly, A higher order estimate of the optimum checkpoint interval for restart dumps, Future
-/// Generation Computer Systems 22 (2006) 303, the estimate of highest order.
-pub fn optimum(delta: f64, m: f64) -> f64 {
-    if delta >= 2.0 * m {
-        return m;
-    }
-    let x = delta / (2.0 * m);
-    (2.0 * delta * m).sqrt() * (1.0 + x.sqrt() / 3.0 + x / 9.0) - delta
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use formats::checkpoint::optimum;
 
     fn seconds(s: f64) -> Duration {
         Duration::from_secs_f64(s)
@@ -165,7 +143,7 @@ mod tests {
         assert!((pace.checkpoint_interval(day).as_secs_f64() - optimum(2.0, 86_400.0)).abs() < 1e-6);
         // What is measured counts more: another machine, other ranks.
         pace.wrote_checkpoint(seconds(8.0));
-        assert_eq!(pace.checkpoint_cost(), Some(seconds(8.0)));
+        assert!((pace.checkpoint_interval(day).as_secs_f64() - optimum(8.0, 86_400.0)).abs() < 1e-6);
     }
 
     #[test]
@@ -178,7 +156,7 @@ mod tests {
             pace.wrote_snapshot(seconds(snapshot));
             pace.wrote_checkpoint(seconds(checkpoint));
             let deadline = seconds(1000.0);
-            let first = (0..10_000).map(|i| seconds(0.1 * f64::from(i))).find(|now| pace.must_stop(*now, deadline));
+            let first = (0..10_000).map(|i| seconds(0.1 * f64::from(i))).find(|now| *now + pace.margin() >= deadline);
             first.unwrap().as_secs_f64()
         };
         assert!((stop(0.5, 0.1, 3.0) - (1000.0 - 0.5 - 6.0 - 2.0)).abs() < 0.11);

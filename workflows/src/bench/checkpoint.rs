@@ -123,19 +123,15 @@ fn measured(programs: &stage::Programs, place: &Path, particles: u64, ranks: u32
     let step: Vec<f64> = steps.iter().map(|seconds| (seconds - whole) / 10.0).collect();
     let count = formats::snapshot::read_header(&folder.initial()).map_or(0, |header| header.count);
     let _ = std::fs::remove_dir_all(folder.path());
-    let checkpoint = Spread::of(&seconds);
-    // As sph-run has it: Daly's optimum, at most 5 % of the time.
-    let mtbf = 24.0 * 3600.0;
-    let x = checkpoint.median / (2.0 * mtbf);
-    let optimum = (2.0 * checkpoint.median * mtbf).sqrt() * (1.0 + x.sqrt() / 3.0 + x / 9.0) - checkpoint.median;
+    let seconds = Spread::of(&seconds);
     Ok(Measured {
         particles: count,
         megabytes: bytes as f64 / 1e6,
-        checkpoint,
+        checkpoint: seconds,
         dd: Spread::of(&dd),
         step: Spread::of(&step),
         restart: whole - last,
-        interval: optimum.max(19.0 * checkpoint.median),
+        interval: checkpoint::interval(seconds.median, 24.0 * 3600.0),
     })
 }
 
