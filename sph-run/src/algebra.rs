@@ -1,19 +1,39 @@
-//! Small vectors and tensors of fixed size.
+//! Small vectors and tensors of fixed size, of plain numbers or of lanes of them ([`crate::lanes`]).
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
+/// What vectors and tensors are made of: f64, f32, or one of either for each particle of a block.
+pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self> {
+    /// self factor + addend: in lanes with one rounding, in plain numbers with two.
+    fn multiply_add(self, factor: Self, addend: Self) -> Self;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn multiply_add(self, factor: Self, addend: Self) -> Self {
+        self * factor + addend
+    }
+}
+
+impl Number for f32 {
+    #[inline(always)]
+    fn multiply_add(self, factor: Self, addend: Self) -> Self {
+        self * factor + addend
+    }
+}
+
 /// A vector of D components.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vector<const D: usize>(pub [f64; D]);
+pub struct Vector<const D: usize, T = f64>(pub [T; D]);
 
 /// A symmetric tensor: the three normal components xx yy zz first, then the shears.
 /// N = 4 in the plane spaces (xx yy zz xz), N = 6 in three dimensions (xx yy zz xy yz xz, the order on disk).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sym<const N: usize>(pub [f64; N]);
+pub struct Sym<const N: usize, T = f64>(pub [T; N]);
 
 /// A general D x D tensor, `m[a][b]` = d v_a / d x_b for a velocity gradient.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Matrix<const D: usize>(pub [[f64; D]; D]);
+pub struct Matrix<const D: usize, T = f64>(pub [[T; D]; D]);
 
 macro_rules! componentwise {
     ($name:ident) => {
@@ -22,33 +42,59 @@ macro_rules! componentwise {
                 Self([0.0; N])
             }
         }
-        impl<const N: usize> Add for $name<N> {
+        impl<const N: usize, T: Number> Add for $name<N, T> {
             type Output = Self;
-            fn add(self, other: Self) -> Self {
-                Self(std::array::from_fn(|a| self.0[a] + other.0[a]))
+            #[inline(always)]
+            fn add(mut self, other: Self) -> Self {
+                for a in 0..N {
+                    self.0[a] = self.0[a] + other.0[a];
+                }
+                self
             }
         }
-        impl<const N: usize> AddAssign for $name<N> {
+        impl<const N: usize, T: Number> AddAssign for $name<N, T> {
+            #[inline(always)]
             fn add_assign(&mut self, other: Self) {
                 *self = *self + other;
             }
         }
-        impl<const N: usize> Sub for $name<N> {
+        impl<const N: usize, T: Number> Sub for $name<N, T> {
             type Output = Self;
-            fn sub(self, other: Self) -> Self {
-                Self(std::array::from_fn(|a| self.0[a] - other.0[a]))
+            #[inline(always)]
+            fn sub(mut self, other: Self) -> Self {
+                for a in 0..N {
+                    self.0[a] = self.0[a] - other.0[a];
+                }
+                self
             }
         }
-        impl<const N: usize> Mul<f64> for $name<N> {
+        impl<const N: usize, T: Number> Mul<T> for $name<N, T> {
             type Output = Self;
-            fn mul(self, factor: f64) -> Self {
-                Self(std::array::from_fn(|a| self.0[a] * factor))
+            #[inline(always)]
+            fn mul(mut self, factor: T) -> Self {
+                for a in 0..N {
+                    self.0[a] = self.0[a] * factor;
+                }
+                self
             }
         }
-        impl<const N: usize> Neg for $name<N> {
+        impl<const N: usize, T: Number> Neg for $name<N, T> {
             type Output = Self;
-            fn neg(self) -> Self {
-                Self(std::array::from_fn(|a| -self.0[a]))
+            #[inline(always)]
+            fn neg(mut self) -> Self {
+                for a in 0..N {
+                    self.0[a] = -self.0[a];
+                }
+                self
+            }
+        }
+        impl<const N: usize, T: Number> $name<N, T> {
+            /// Adds `factor other`.
+            #[inline(always)]
+            pub fn add_scaled(&mut self, factor: T, other: Self) {
+                for a in 0..N {
+                    self.0[a] = other.0[a].multiply_add(factor, self.0[a]);
+                }
             }
         }
     };
@@ -56,19 +102,24 @@ macro_rules! componentwise {
 componentwise!(Vector);
 componentwise!(Sym);
 
-impl<const D: usize> Vector<D> {
+impl<const D: usize, T: Number> Vector<D, T> {
     /// Inner product, summed from the first component on.
-    pub fn dot(self, other: Self) -> f64 {
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> T {
         let mut sum = self.0[0] * other.0[0];
         for a in 1..D {
-            sum += self.0[a] * other.0[a];
+            sum = self.0[a].multiply_add(other.0[a], sum);
         }
         sum
     }
     /// Squared length.
-    pub fn norm2(self) -> f64 {
+    #[inline(always)]
+    pub fn norm2(self) -> T {
         self.dot(self)
     }
+}
+
+impl<const D: usize> Vector<D> {
     /// Length.
     pub fn norm(self) -> f64 {
         self.norm2().sqrt()
@@ -103,10 +154,16 @@ impl<const N: usize> Sym<N> {
     }
 }
 
-impl<const D: usize> Add for Matrix<D> {
+impl<const D: usize, T: Number> Add for Matrix<D, T> {
     type Output = Self;
-    fn add(self, other: Self) -> Self {
-        Self(std::array::from_fn(|a| std::array::from_fn(|b| self.0[a][b] + other.0[a][b])))
+    #[inline(always)]
+    fn add(mut self, other: Self) -> Self {
+        for a in 0..D {
+            for b in 0..D {
+                self.0[a][b] = self.0[a][b] + other.0[a][b];
+            }
+        }
+        self
     }
 }
 
@@ -116,15 +173,31 @@ impl<const D: usize> Default for Matrix<D> {
     }
 }
 
+impl<const D: usize, T: Number> Matrix<D, T> {
+    /// Matrix times vector.
+    #[inline(always)]
+    pub fn times(&self, v: Vector<D, T>) -> Vector<D, T> {
+        let mut product = v;
+        for a in 0..D {
+            product.0[a] = Vector(self.0[a]).dot(v);
+        }
+        product
+    }
+    /// Adds `a (x) b`.
+    #[inline(always)]
+    pub fn add_outer(&mut self, a: Vector<D, T>, b: Vector<D, T>) {
+        for i in 0..D {
+            for j in 0..D {
+                self.0[i][j] = a.0[i].multiply_add(b.0[j], self.0[i][j]);
+            }
+        }
+    }
+}
+
 impl<const D: usize> Matrix<D> {
     /// The unit tensor.
     pub fn unit() -> Self {
         Self(std::array::from_fn(|a| std::array::from_fn(|b| if a == b { 1.0 } else { 0.0 })))
-    }
-    /// Matrix times vector.
-    #[inline(always)]
-    pub fn times(&self, v: Vector<D>) -> Vector<D> {
-        Vector(std::array::from_fn(|a| Vector(self.0[a]).dot(v)))
     }
     /// Matrix product.
     pub fn product(&self, other: &Self) -> Self {
@@ -156,16 +229,6 @@ impl<const D: usize> Matrix<D> {
         // Cyclic indices carry the sign.
         let (r, s, u, v) = ((a + 1) % D, (a + 2) % D, (b + 1) % D, (b + 2) % D);
         m[r][u] * m[s][v] - m[r][v] * m[s][u]
-    }
-    /// Adds `factor a (x) b`.
-    #[inline(always)]
-    pub fn add_outer(&mut self, factor: f64, a: Vector<D>, b: Vector<D>) {
-        for i in 0..D {
-            let f = factor * a.0[i];
-            for j in 0..D {
-                self.0[i][j] += f * b.0[j];
-            }
-        }
     }
 }
 

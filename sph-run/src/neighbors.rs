@@ -1,112 +1,155 @@
-//! Lists of the neighbours of each owned particle, and of the material each wall particle sees.
+//! Lists of what can be near blocks of particles: of the owned ones, and of the wall's.
 //!
-//! A list holds every particle that can come within the support before the next build, in ascending key. Longer lists
-//! than needed do no harm: the sweeps skip what is outside the support, so sums do not depend on when lists are built.
+//! A list holds every particle that can come within the support of one of the block before the next build, in ascending
+//! key. Longer lists than needed do no harm: outside the support the kernel is zero, so sums do not depend on when lists are
+//! built, nor on the blocks.
 
 use crate::algebra::Vector;
+use crate::lanes::{Doubles, Instructions, Lanes, Parts};
 use crate::particles::Particles;
-use crate::physics::Kernel;
-use crate::sweep::Support;
+use pulp::{Simd, WithSimd};
+use std::ops::Range;
 
-/// Lists of indices, one after the other.
+/// Blocks of consecutive particles, and a list of candidates for each.
 #[derive(Clone, Debug, Default)]
 pub struct Lists {
+    count: usize,
+    block: usize,
     starts: Vec<u32>,
-    indices: Vec<u32>,
+    candidates: Vec<u32>,
 }
 
 impl Lists {
-    /// The list of entry `i`.
-    pub fn of(&self, i: usize) -> &[u32] {
-        &self.indices[self.starts[i] as usize..self.starts[i + 1] as usize]
-    }
-    /// Number of lists.
-    pub fn len(&self) -> usize {
-        self.starts.len().saturating_sub(1)
-    }
-    /// No lists?
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-    /// Where the list of entry `i` starts among all indices.
-    pub fn start(&self, i: usize) -> usize {
-        self.starts[i] as usize
+    /// Each block, counted from the first particle that has a list, and its candidates.
+    pub fn blocks(&self) -> impl Iterator<Item = (Range<usize>, &[u32])> {
+        self.starts.windows(2).enumerate().map(|(b, ends)| {
+            let particles = b * self.block..((b + 1) * self.block).min(self.count);
+            (particles, &self.candidates[ends[0] as usize..ends[1] as usize])
+        })
     }
 
-    fn clear(&mut self) {
-        self.starts.clear();
-        self.starts.push(0);
-        self.indices.clear();
+    /// The candidates of a particle, itself among them if it is one of the range the lists are made from.
+    pub fn of(&self, i: usize) -> &[u32] {
+        let b = i / self.block;
+        &self.candidates[self.starts[b] as usize..self.starts[b + 1] as usize]
     }
-    fn close(&mut self) {
-        self.starts.push(u32::try_from(self.indices.len()).expect("a rank holds fewer than 2^32 pairs"));
+
+    /// Number of particles that have a list.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// No lists?
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
     }
 }
 
 /// Neighbour lists of one rank.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbors {
-    /// For each owned particle: particles of all ranges but itself.
+    /// For the owned particles: particles of all ranges.
     pub of_owned: Lists,
-    /// For each wall particle: material particles of all ranges but the walls.
+    /// For the wall particles: material particles of all ranges but the walls.
     pub of_wall: Lists,
-    /// Of the lists of owned particles, what is within the support at this step.
-    pub support: Support,
 }
 
 impl Neighbors {
-    /// Finds what is within the support, 2h, at the present places.
-    pub fn find<const D: usize, const N: usize, K: Kernel>(&mut self, particles: &Particles<D, N>, h: f64) {
-        self.support.find::<D, N, K>(particles, &self.of_owned, h);
-    }
-
-    /// Lists of all pairs closer than `reach`.
-    pub fn build<const D: usize, const N: usize>(&mut self, particles: &Particles<D, N>, reach: f64) {
+    /// Lists of all pairs closer than `reach`, for blocks of `block` particles.
+    pub fn build<const D: usize, const N: usize>(
+        &mut self,
+        particles: &Particles<D, N>,
+        reach: f64,
+        block: usize,
+        instructions: Instructions,
+    ) {
         // Number the particles in ascending key. Cells hold these numbers, so that a list is sorted as plain integers.
         let mut by_key: Vec<u32> = (0..particles.len() as u32).collect();
         by_key.sort_unstable_by_key(|&i| particles.key[i as usize]);
-        let cells = Cells::new(&particles.x, &by_key, reach);
-
-        let mut found: Vec<u32> = Vec::new();
-        let mut collect = |lists: &mut Lists, i: usize, limit: usize| {
-            found.clear();
-            let x = particles.x[i];
-            cells.near(x, |number| {
-                let j = by_key[number as usize] as usize;
-                if j != i && j < limit && (x - particles.x[j]).norm2() < reach * reach {
-                    found.push(number);
-                }
-            });
-            found.sort(); // merges the runs of the cells
-            lists.indices.extend(found.iter().map(|&number| by_key[number as usize]));
-            lists.close();
-        };
-        self.of_owned.clear();
-        for i in 0..particles.owned {
-            collect(&mut self.of_owned, i, particles.len());
-        }
-        self.of_wall.clear();
-        for i in particles.mirror..particles.len() {
-            collect(&mut self.of_wall, i, particles.mirror);
-        }
+        let mut cells = Cells::new(&particles.x, &by_key, 0.5 * reach);
+        let (x, by_key) = (&particles.x, &by_key[..]);
+        let lists = &mut self.of_owned;
+        instructions.run(Build { lists, cells: &cells, x: &x[..particles.owned], by_key, reach, block });
+        cells.forget(particles.mirror, by_key);
+        let lists = &mut self.of_wall;
+        instructions.run(Build { lists, cells: &cells, x: &x[particles.mirror..], by_key, reach, block });
     }
 }
 
-/// A grid of cells at least `reach` wide. Its outermost cells reach to infinity.
+/// Lists for blocks of the particles at `x`.
+struct Build<'a, const D: usize> {
+    lists: &'a mut Lists,
+    cells: &'a Cells<D>,
+    x: &'a [Vector<D>],
+    by_key: &'a [u32],
+    reach: f64,
+    block: usize,
+}
+
+impl<const D: usize> WithSimd for Build<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, token: S) {
+        let Self { lists, cells, x, by_key, reach, block } = self;
+        lists.count = x.len();
+        lists.block = block;
+        lists.starts.clear();
+        lists.starts.push(0);
+        lists.candidates.clear();
+        let reach2 = Doubles::all(token, reach * reach);
+        let mut found: Vec<u32> = Vec::new();
+        let mut runs = Vec::new();
+        let mut lanes: Vec<Vector<D, Doubles<S>>> = Vec::new();
+        for own in x.chunks(block) {
+            let (low, high) = bounds(own);
+            lanes.clear();
+            lanes.extend(
+                own.chunks(Doubles::<S>::LANES)
+                    .map(|some| Vector::from_parts(|a| Doubles::each(token, |k| some[k.min(some.len() - 1)].0[a]))),
+            );
+            cells.near(low, high, reach, &mut runs);
+            found.clear();
+            for run in &runs {
+                // Room for all, so that what is no candidate is written over and needs no branch.
+                let mut end = found.len();
+                found.resize(end + run.len(), 0);
+                for (&number, place) in cells.numbers[run.clone()].iter().zip(&cells.places[run.clone()]) {
+                    found[end] = number;
+                    let place = Vector::from_parts(|a| Doubles::all(token, place.0[a]));
+                    let mut near = false;
+                    for &own in &lanes {
+                        near |= (own - place).norm2().any_below(reach2);
+                    }
+                    end += usize::from(near);
+                }
+                found.truncate(end);
+            }
+            found.sort_unstable();
+            lists.candidates.extend(found.iter().map(|&number| by_key[number as usize]));
+            lists.starts.push(u32::try_from(lists.candidates.len()).expect("a rank holds fewer than 2^32 candidates"));
+        }
+        lists.candidates.shrink_to(lists.candidates.len() + lists.candidates.len() / 8);
+    }
+}
+
+/// A grid of cells at least `width` wide. Its outermost cells reach to infinity.
 struct Cells<const D: usize> {
     low: Vector<D>,
     width: f64,
     count: [usize; D],
     starts: Vec<u32>,
-    members: Vec<u32>,
+    /// Number and place of each particle, cell by cell.
+    numbers: Vec<u32>,
+    places: Vec<Vector<D>>,
 }
 
 impl<const D: usize> Cells<D> {
-    fn new(x: &[Vector<D>], by_key: &[u32], reach: f64) -> Self {
+    fn new(x: &[Vector<D>], by_key: &[u32], width: f64) -> Self {
         // A few particles far out must not make millions of empty cells: the grid covers where nearly all are, and its
         // outermost cells take in the rest. Should that not do, the cells are widened.
         let (low, high) = bulk(x);
-        let mut width = reach;
+        let mut width = width;
         let shape = |width: f64| -> [usize; D] {
             std::array::from_fn(|a| (((high.0[a] - low.0[a]) / width).max(0.0) as usize).saturating_add(1))
         };
@@ -114,8 +157,14 @@ impl<const D: usize> Cells<D> {
             width *= 2.0;
         }
         let count = shape(width);
-        let mut cells =
-            Self { low, width, count, starts: vec![0; count.iter().product::<usize>() + 1], members: vec![] };
+        let mut cells = Self {
+            low,
+            width,
+            count,
+            starts: vec![0; count.iter().product::<usize>() + 1],
+            numbers: vec![0; by_key.len()],
+            places: vec![Vector::default(); by_key.len()],
+        };
         let cell: Vec<u32> = by_key.iter().map(|&i| cells.index(cells.coordinates(x[i as usize])) as u32).collect();
         for &c in &cell {
             cells.starts[c as usize + 1] += 1;
@@ -124,12 +173,27 @@ impl<const D: usize> Cells<D> {
             cells.starts[c] += cells.starts[c - 1];
         }
         let mut next = cells.starts.clone();
-        cells.members = vec![0; by_key.len()];
         for (number, &c) in cell.iter().enumerate() {
-            cells.members[next[c as usize] as usize] = number as u32;
+            let at = next[c as usize] as usize;
+            cells.numbers[at] = number as u32;
+            cells.places[at] = x[by_key[number] as usize];
             next[c as usize] += 1;
         }
         cells
+    }
+
+    /// Takes out all particles whose index is `end` or more.
+    fn forget(&mut self, end: usize, by_key: &[u32]) {
+        let (mut kept, mut start) = (0, 0);
+        for c in 1..self.starts.len() {
+            for k in std::mem::replace(&mut start, self.starts[c] as usize)..self.starts[c] as usize {
+                if (by_key[self.numbers[k] as usize] as usize) < end {
+                    (self.numbers[kept], self.places[kept]) = (self.numbers[k], self.places[k]);
+                    kept += 1;
+                }
+            }
+            self.starts[c] = kept as u32;
+        }
     }
 
     fn coordinates(&self, x: Vector<D>) -> [usize; D] {
@@ -140,23 +204,16 @@ impl<const D: usize> Cells<D> {
         (0..D).rev().fold(0, |index, a| index * self.count[a] + c[a])
     }
 
-    /// Calls `visit` with every particle in the cell of `x` and the cells around it.
-    fn near(&self, x: Vector<D>, mut visit: impl FnMut(u32)) {
-        let c = self.coordinates(x);
-        let mut low = c;
-        let mut high = c;
-        for a in 0..D {
-            low[a] = c[a].saturating_sub(1);
-            high[a] = (c[a] + 1).min(self.count[a] - 1);
-        }
+    /// Runs of cells that hold all particles within `reach` of a box, and some more.
+    fn near(&self, low: Vector<D>, high: Vector<D>, reach: f64, runs: &mut Vec<Range<usize>>) {
+        runs.clear();
+        let all = Vector([reach; D]);
+        let (low, high) = (self.coordinates(low - all), self.coordinates(high + all));
         let mut at = low;
         loop {
-            // Cells that follow each other along the first axis are one run of members.
+            // Cells that follow each other along the first axis are one run of particles.
             let first = self.index(at);
-            let last = first + high[0] - low[0];
-            for &member in &self.members[self.starts[first] as usize..self.starts[last + 1] as usize] {
-                visit(member);
-            }
+            runs.push(self.starts[first] as usize..self.starts[first + high[0] - low[0] + 1] as usize);
             let Some(axis) = (1..D).find(|&a| at[a] < high[a]) else { return };
             at[axis] += 1;
             at[1..axis].copy_from_slice(&low[1..axis]);
@@ -182,18 +239,42 @@ fn bulk<const D: usize>(x: &[Vector<D>]) -> (Vector<D>, Vector<D>) {
 
 /// Lower and upper corner of the box around some points; zeros where there are none.
 pub fn bounds<const D: usize>(x: &[Vector<D>]) -> (Vector<D>, Vector<D>) {
-    let Some(&first) = x.first() else { return (Vector::default(), Vector::default()) };
-    x.iter().fold((first, first), |(low, high), p| {
+    bounds_of(x.iter().copied())
+}
+
+fn bounds_of<const D: usize>(mut x: impl Iterator<Item = Vector<D>>) -> (Vector<D>, Vector<D>) {
+    let Some(first) = x.next() else { return (Vector::default(), Vector::default()) };
+    x.fold((first, first), |(low, high), p| {
         (Vector(std::array::from_fn(|a| low.0[a].min(p.0[a]))), Vector(std::array::from_fn(|a| high.0[a].max(p.0[a]))))
     })
 }
 
-/// The order of owned particles along rows of cells of the given width: close in memory what is close in space.
-pub fn cell_order<const D: usize>(x: &[Vector<D>], width: f64) -> Vec<u32> {
-    let (low, _) = bounds(x);
-    let cell =
-        |p: &Vector<D>| -> [u64; D] { std::array::from_fn(|a| ((p.0[D - 1 - a] - low.0[D - 1 - a]) / width) as u64) };
-    let mut order: Vec<u32> = (0..x.len() as u32).collect();
-    order.sort_by_cached_key(|&i| (cell(&x[i as usize]), i));
-    order
+/// An order in which consecutive particles are close to each other in blocks of every power of two up to [`LARGEST_BLOCK`]:
+/// halves along the longest side of the box around them, again and again.
+pub fn blocks_order<const D: usize>(x: &[Vector<D>]) -> Vec<u32> {
+    let mut places: Vec<(Vector<D>, u32)> = x.iter().copied().zip(0..).collect();
+    halve(&mut places);
+    places.into_iter().map(|(_, i)| i).collect()
+}
+
+/// Lanes of f32 in AVX-512.
+const LARGEST_BLOCK: usize = 16;
+
+fn halve<const D: usize>(places: &mut [(Vector<D>, u32)]) {
+    if places.len() < 2 {
+        return;
+    }
+    let (low, high) = bounds_of(places.iter().map(|(x, _)| *x));
+    let side = high - low;
+    let axis = (1..D).fold(0, |longest, a| if side.0[a] > side.0[longest] { a } else { longest });
+    // Whole blocks on the left.
+    let mut block = LARGEST_BLOCK;
+    while block >= places.len() {
+        block /= 2;
+    }
+    let half = places.len().div_ceil(2 * block) * block;
+    places.select_nth_unstable_by(half, |(a, i), (b, j)| a.0[axis].total_cmp(&b.0[axis]).then(i.cmp(j)));
+    let (left, right) = places.split_at_mut(half);
+    halve(left);
+    halve(right);
 }

@@ -1,13 +1,28 @@
 //! Types chosen once: a space, a kernel and a material bundled, so that signatures stay short.
 
+use crate::lanes::Lanes;
+use crate::sweep::Scales;
 use crate::{material::Material, space::Space};
 use formats::kernel::Kernel as Kind;
 use std::marker::PhantomData;
 
-/// A smoothing kernel as a type: shape and slope are resolved at compile time.
+/// A smoothing kernel as a type, in lanes.
+///
+/// Both kernels are powers of what is left of the support, (2h - r)+, and so exact zeros outside it.
 pub trait Kernel: Copy + Send + Sync + 'static {
     /// Its name, shape and normalisation.
     const KIND: Kind;
+    /// W = norm VALUE h^-VALUE_POWER value(r)
+    const VALUE: f64;
+    const VALUE_POWER: i32;
+    /// W'/r = norm SLOPE h^-SLOPE_POWER slope(r)
+    const SLOPE: f64;
+    const SLOPE_POWER: i32;
+
+    /// W up to a factor.
+    fn value<L: Lanes>(r: L, scales: &Scales<L>) -> L;
+    /// W'/r up to a factor; `inverse`: 1/r.
+    fn slope<L: Lanes>(r: L, inverse: L, scales: &Scales<L>) -> L;
 }
 
 /// See [`Kind::CubicSpline`].
@@ -15,6 +30,22 @@ pub trait Kernel: Copy + Send + Sync + 'static {
 pub struct CubicSpline;
 impl Kernel for CubicSpline {
     const KIND: Kind = Kind::CubicSpline;
+    // ((2-q)+^3 - 4 (1-q)+^3)/6
+    const VALUE: f64 = 1.0 / 6.0;
+    const VALUE_POWER: i32 = 3;
+    const SLOPE: f64 = -0.5;
+    const SLOPE_POWER: i32 = 3;
+
+    #[inline(always)]
+    fn value<L: Lanes>(r: L, scales: &Scales<L>) -> L {
+        let (outer, inner) = (scales.outer(r), scales.inner(r));
+        (inner * inner * inner).multiply_add(scales.minus_four, outer * outer * outer)
+    }
+    #[inline(always)]
+    fn slope<L: Lanes>(r: L, inverse: L, scales: &Scales<L>) -> L {
+        let (outer, inner) = (scales.outer(r), scales.inner(r));
+        (inner * inner).multiply_add(scales.minus_four, outer * outer) * inverse
+    }
 }
 
 /// See [`Kind::WendlandC2`].
@@ -22,6 +53,22 @@ impl Kernel for CubicSpline {
 pub struct WendlandC2;
 impl Kernel for WendlandC2 {
     const KIND: Kind = Kind::WendlandC2;
+    const VALUE: f64 = 1.0 / 16.0;
+    const VALUE_POWER: i32 = 5;
+    // -5 (1 - q/2)+^3
+    const SLOPE: f64 = -5.0 / 8.0;
+    const SLOPE_POWER: i32 = 5;
+
+    #[inline(always)]
+    fn value<L: Lanes>(r: L, scales: &Scales<L>) -> L {
+        let square = scales.outer(r) * scales.outer(r);
+        square * square * (r + r + scales.h)
+    }
+    #[inline(always)]
+    fn slope<L: Lanes>(r: L, _: L, scales: &Scales<L>) -> L {
+        let outer = scales.outer(r);
+        outer * outer * outer
+    }
 }
 
 /// The axes along which the solver is compiled: space (D coordinates, N stress components), kernel, material.

@@ -5,8 +5,9 @@ use crate::boundary::field::Spread;
 use crate::boundary::mirror::Mirrors;
 use crate::boundary::periodic::Periods;
 use crate::boundary::wall::Walls;
+use crate::lanes::Instructions;
 use crate::material::Material as _;
-use crate::neighbors::{Neighbors, cell_order};
+use crate::neighbors::{Neighbors, blocks_order};
 use crate::parallel::halo::{Fields, Halo};
 use crate::parallel::migrate;
 use crate::parallel::orb::Tree;
@@ -134,7 +135,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
                 damping: numerics.damping,
                 gate: numerics.density_gate * scene.material.density(),
                 skin: SKIN * h,
-                pairs: Pairs { h, spacing: dx },
+                pairs: Pairs { h, spacing: dx, instructions: Instructions::best() },
                 viscosity,
                 stabilisers: Stabilisers::new(scene),
                 count,
@@ -178,7 +179,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         migrate::owners::<D, N, P::Space>(self.comm, &self.partition.tree, &mut self.particles);
         let (h, skin) = (self.parameters.h, self.parameters.skin);
         let reach = 2.0 * h + skin;
-        let order = cell_order(&self.particles.x, reach);
+        let order = blocks_order(&self.particles.x);
         self.particles.arrange(&order);
         self.partition.planned.get_or_insert(self.particles.owned as u64);
         self.x_build.clone_from(&self.particles.x);
@@ -197,7 +198,8 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         self.mirrors.create(&mut self.particles, reach_of);
         self.mirrors.fill(&mut self.particles, Fields::Motion);
         self.walls.create::<D, N, P::Space>(&mut self.particles, reach);
-        self.neighbors.build(&self.particles, reach);
+        let instructions = self.parameters.pairs.instructions;
+        self.neighbors.build(&self.particles, reach, instructions.block(size_of::<f64>()), instructions);
         self.walls.fill_motion::<D, N, P::Space, P::Kernel>(
             &mut self.particles,
             &self.neighbors,
@@ -216,7 +218,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
                 self.walls.fill_motion::<D, N, P::Space, P::Kernel>(p, &self.neighbors, self.parameters.pairs);
             }
             Fields::Stress => {
-                self.walls.fill_stress::<D, N, P::Space>(p, &self.neighbors);
+                self.walls.fill_stress::<D, N, P::Space, P::Kernel>(p, &self.neighbors, self.parameters.pairs);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The three spaces as types: sizes of vectors and tensors, and what differs between them.
 
-use crate::algebra::{Matrix, Sym, Vector};
+use crate::algebra::{Matrix, Number, Sym, Vector};
 use formats::space::Space as Kind;
 use std::f64::consts::TAU;
 use std::fmt::Debug;
@@ -12,6 +12,8 @@ use std::fmt::Debug;
 pub trait Space<const D: usize, const N: usize>: Copy + Debug + Default + Send + Sync + 'static {
     /// Its name on disk.
     const KIND: Kind;
+    /// Is the metric anything but 1?
+    const WEIGHTED: bool;
 
     /// Weight w of a place in volume integrals: dV = w dA up to a constant. 1, or the radius in the axisymmetric space:
     /// kept away from zero, and signed, so that images across the axis have negative ones.
@@ -24,7 +26,7 @@ pub trait Space<const D: usize, const N: usize>: Copy + Debug + Default + Send +
     fn strain_rate(gradient: &Matrix<D>, x: Vector<D>, v: Vector<D>, spacing: f64) -> Sym<N>;
 
     /// stress . n
-    fn traction(stress: &Sym<N>, n: Vector<D>) -> Vector<D>;
+    fn traction<T: Number>(stress: &Sym<N, T>, n: Vector<D, T>) -> Vector<D, T>;
 
     /// The tensor as a matrix of the D coordinates.
     fn matrix(stress: &Sym<N>) -> Matrix<D>;
@@ -59,10 +61,10 @@ pub struct ThreeD;
 /// Layout of the two plane spaces: coordinates x z, tensor xx yy zz xz.
 mod plane {
     use super::*;
-    pub fn traction(s: &Sym<4>, n: Vector<2>) -> Vector<2> {
+    #[inline(always)]
+    pub fn traction<T: Number>(s: &Sym<4, T>, n: Vector<2, T>) -> Vector<2, T> {
         let [xx, _, zz, xz] = s.0;
-        let [x, z] = n.0;
-        Vector([xx * x + xz * z, xz * x + zz * z])
+        Matrix([[xx, xz], [xz, zz]]).times(n)
     }
     pub fn matrix(s: &Sym<4>) -> Matrix<2> {
         let [xx, _, zz, xz] = s.0;
@@ -93,7 +95,8 @@ mod plane {
 
 macro_rules! plane_layout {
     () => {
-        fn traction(s: &Sym<4>, n: Vector<2>) -> Vector<2> {
+        #[inline(always)]
+        fn traction<T: Number>(s: &Sym<4, T>, n: Vector<2, T>) -> Vector<2, T> {
             plane::traction(s, n)
         }
         fn matrix(s: &Sym<4>) -> Matrix<2> {
@@ -122,6 +125,7 @@ macro_rules! plane_layout {
 
 impl Space<2, 4> for PlaneStrain {
     const KIND: Kind = Kind::PlaneStrain;
+    const WEIGHTED: bool = false;
     fn metric(_: Vector<2>, _: f64) -> f64 {
         1.0
     }
@@ -145,6 +149,7 @@ fn radius(x: Vector<2>, spacing: f64) -> f64 {
 
 impl Space<2, 4> for Axisymmetric {
     const KIND: Kind = Kind::Axisymmetric;
+    const WEIGHTED: bool = true;
     fn metric(x: Vector<2>, spacing: f64) -> f64 {
         radius(x, spacing).copysign(x.0[0])
     }
@@ -162,6 +167,7 @@ impl Space<2, 4> for Axisymmetric {
 
 impl Space<3, 6> for ThreeD {
     const KIND: Kind = Kind::ThreeD;
+    const WEIGHTED: bool = false;
     fn metric(_: Vector<3>, _: f64) -> f64 {
         1.0
     }
@@ -173,10 +179,10 @@ impl Space<3, 6> for ThreeD {
         let shear = |a: usize, b: usize| 0.5 * (m[a][b] + m[b][a]);
         Sym([m[0][0], m[1][1], m[2][2], shear(0, 1), shear(1, 2), shear(0, 2)])
     }
-    fn traction(s: &Sym<6>, n: Vector<3>) -> Vector<3> {
+    #[inline(always)]
+    fn traction<T: Number>(s: &Sym<6, T>, n: Vector<3, T>) -> Vector<3, T> {
         let [xx, yy, zz, xy, yz, xz] = s.0;
-        let [x, y, z] = n.0;
-        Vector([xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z])
+        Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).times(n)
     }
     fn matrix(s: &Sym<6>) -> Matrix<3> {
         let [xx, yy, zz, xy, yz, xz] = s.0;

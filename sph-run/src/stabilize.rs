@@ -4,6 +4,7 @@
 //! scheme pays nothing.
 
 use crate::algebra::{Matrix, Sym, Vector};
+use crate::boundary::wall::extend;
 use crate::material::Material as _;
 use crate::physics::Physics;
 use crate::rates::correction::{Among, correction};
@@ -76,7 +77,13 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             return;
         }
         let mut tensors = std::mem::take(&mut self.buffers.correction);
-        correction(&self.particles, &self.neighbors, Among::All, &mut tensors);
+        correction::<D, N, P::Kernel>(
+            &self.particles,
+            &self.neighbors,
+            self.parameters.pairs,
+            Among::All,
+            &mut tensors,
+        );
         self.spread(&mut tensors);
         // Behind walls the support is full of what the wall mirrors.
         tensors[self.particles.mirror..].fill(Matrix::unit());
@@ -98,27 +105,43 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         if density_diffusion == 0.0 && stress_diffusion == 0.0 {
             return;
         }
-        let mut buffers = std::mem::take(&mut self.buffers);
+        let (pairs, mut buffers) = (self.parameters.pairs, std::mem::take(&mut self.buffers));
         let p = &self.particles;
-        correction(p, &self.neighbors, Among::Material, &mut buffers.material_correction);
+        correction::<D, N, P::Kernel>(p, &self.neighbors, pairs, Among::Material, &mut buffers.material_correction);
         let l = &buffers.material_correction;
         if density_diffusion > 0.0 {
             let mut density = std::mem::take(&mut buffers.density);
             density.clone_from(&self.particles.density);
             self.spread(&mut density);
             let (p, slopes) = (&self.particles, &mut buffers.density_gradient);
-            diffusion::gradient(p, &self.neighbors, l, &density, slopes);
+            diffusion::gradient::<D, N, P::Kernel, _>(p, &self.neighbors, pairs, l, &density, slopes);
             self.spread(&mut buffers.density_gradient);
             let (p, slopes, rate) = (&self.particles, &buffers.density_gradient, &mut buffers.density_rate);
-            diffusion::diffusion(p, &self.neighbors, density_diffusion, &density, slopes, rate);
+            diffusion::diffusion::<D, N, P::Kernel, _>(
+                p,
+                &self.neighbors,
+                pairs,
+                density_diffusion,
+                &density,
+                slopes,
+                rate,
+            );
             buffers.density = density;
         }
         if stress_diffusion > 0.0 {
             let (p, slopes) = (&self.particles, &mut buffers.stress_gradient);
-            diffusion::gradient(p, &self.neighbors, l, &p.stress, slopes);
+            diffusion::gradient::<D, N, P::Kernel, _>(p, &self.neighbors, pairs, l, &p.stress, slopes);
             self.spread(&mut buffers.stress_gradient);
             let (p, slopes, rate) = (&self.particles, &buffers.stress_gradient, &mut buffers.stress_rate);
-            diffusion::diffusion(p, &self.neighbors, stress_diffusion, &p.stress, slopes, rate);
+            diffusion::diffusion::<D, N, P::Kernel, _>(
+                p,
+                &self.neighbors,
+                pairs,
+                stress_diffusion,
+                &p.stress,
+                slopes,
+                rate,
+            );
         }
         self.buffers = buffers;
     }
@@ -130,7 +153,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         }
         let mut viscosity = std::mem::take(&mut self.particles.viscosity);
         self.spread(&mut viscosity);
-        self.walls.extend(self.particles.mirror, &self.neighbors, &mut viscosity);
+        extend::<D, N, P::Kernel, _>(&self.particles, &self.neighbors, self.parameters.pairs, &mut viscosity);
         self.particles.viscosity = viscosity;
     }
 
@@ -140,10 +163,10 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         let Stabilisers { artificial_stress: epsilon, impact, .. } = self.parameters.stabilisers;
         let Buffers { heat, opposing, .. } = &mut self.buffers;
         if let Some(mean) = self.material.pair_viscosity() {
-            viscosity::between_particles::<D, N, P::Space>(p, neighbors, pairs, mean, acceleration, heat);
+            viscosity::between_particles::<D, N, P::Space, P::Kernel>(p, neighbors, pairs, mean, acceleration, heat);
         }
         if impact > 0.0 {
-            viscosity::on_impact::<D, N, P::Space>(p, neighbors, pairs, impact, acceleration, heat);
+            viscosity::on_impact::<D, N, P::Space, P::Kernel>(p, neighbors, pairs, impact, acceleration, heat);
         }
         if epsilon > 0.0 {
             artificial_stress::opposing::<D, N, P::Space>(p, epsilon, pairs.spacing, opposing);
@@ -166,10 +189,10 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         }
         let (pairs, mut buffers) = (self.parameters.pairs, std::mem::take(&mut self.buffers));
         let Buffers { surface, shift, .. } = &mut buffers;
-        shifting::surface(&self.particles, &self.neighbors, surface);
+        shifting::surface::<D, N, P::Kernel>(&self.particles, &self.neighbors, pairs, surface);
         self.spread(surface);
         let how = shifting::Shifting { strength, dt, surface };
-        shifting::shift(&self.particles, &self.neighbors, pairs, how, shift);
+        shifting::shift::<D, N, P::Kernel>(&self.particles, &self.neighbors, pairs, how, shift);
         for (x, shift) in self.particles.x.iter_mut().zip(shift.iter()) {
             *x += self.periods.rounded(*shift);
         }

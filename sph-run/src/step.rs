@@ -18,7 +18,6 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Accelerations at the very start, of stress and artificial viscosity: viscosities between particles follow from the
     /// first strain. Collective.
     pub fn begin(&mut self) {
-        self.find_support();
         self.refresh_correction();
         self.accelerate();
     }
@@ -38,7 +37,6 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             // New copies have none yet; and what crossed a plane of symmetry turned its own around.
             self.fill(Fields::Stress);
         }
-        self.find_support();
         self.refresh_correction();
         self.diffuse();
         self.update_stress(dt);
@@ -51,10 +49,6 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.clock.time = plan.time;
         self.clock.time_step = dt;
         self.clock.step += 1;
-    }
-
-    fn find_support(&mut self) {
-        self.neighbors.find::<D, N, P::Kernel>(&self.particles, self.parameters.h);
     }
 
     /// v += a dt, damped implicitly.
@@ -78,7 +72,12 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Density and stress of the owned particles, from the velocity gradient.
     fn update_stress(&mut self, dt: f64) {
         let (spacing, gate) = (self.parameters.spacing, self.parameters.gate);
-        velocity_gradient(&self.particles, &self.neighbors, &mut self.gradient);
+        velocity_gradient::<D, N, P::Kernel>(
+            &self.particles,
+            &self.neighbors,
+            self.parameters.pairs,
+            &mut self.gradient,
+        );
         self.correct_gradient();
         let p = &mut self.particles;
         let viscous = self.material.pair_viscosity().is_some();
@@ -137,11 +136,11 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         p.a = a;
     }
 
-    fn accelerate_by<T: Traction<D, N>>(&mut self, weighted: &[T], a: &mut [Vector<D>]) {
+    fn accelerate_by<F: Traction<D, N, f64>>(&mut self, weighted: &[F], a: &mut [Vector<D>]) {
         let (p, heat, parameters) = (&self.particles, &mut self.buffers.heat, &self.parameters);
         heat.resize(p.owned, 0.0);
         let (pairs, viscosity) = (parameters.pairs, parameters.viscosity);
-        momentum::<D, N, P::Space, T>(p, &self.neighbors, pairs, viscosity, weighted, a, heat);
+        momentum::<D, N, P::Space, P::Kernel, F>(p, &self.neighbors, pairs, viscosity, weighted, a, heat);
     }
 
     /// Counts the heat of the viscosity.

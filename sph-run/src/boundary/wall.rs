@@ -7,10 +7,11 @@
 
 use crate::algebra::Vector;
 use crate::boundary::mirror::reflect_stress;
-use crate::neighbors::Neighbors;
+use crate::lanes::Parts;
+use crate::neighbors::{Neighbors, blocks_order};
 use crate::particles::Particles;
 use crate::physics::Kernel;
-use crate::rates::wall::{extrapolate, weights};
+use crate::rates::wall::extrapolate;
 use crate::space::Space;
 use crate::sweep::Pairs;
 use formats::scene::{Parity, Site, WallLattice};
@@ -21,13 +22,12 @@ pub struct Walls {
     lattice: WallLattice,
     volume: f64,
     parities: Vec<Parity>,
-    weights: Vec<f64>,
 }
 
 impl Walls {
     /// For walls on `lattice`, whose particles have the given volume dx^D.
     pub fn new(lattice: WallLattice, volume: f64) -> Self {
-        Self { lattice, volume, parities: Vec::new(), weights: Vec::new() }
+        Self { lattice, volume, parities: Vec::new() }
     }
 
     /// Are there walls of virtual particles at all?
@@ -60,8 +60,10 @@ impl Walls {
         }
         unique(&mut sites);
         self.parities.clear();
-        for (key, site) in sites {
-            let place = self.lattice.position(site);
+        let places: Vec<[f64; 3]> = sites.iter().map(|&(_, site)| self.lattice.position(site)).collect();
+        let order = blocks_order(&places.iter().map(|&place| S::from_disk(place)).collect::<Vec<_>>());
+        for i in order {
+            let ((key, _), place) = (sites[i as usize], places[i as usize]);
             self.parities.push(self.lattice.parity(place));
             p.key.push(key);
             p.x.push(S::from_disk(place));
@@ -70,41 +72,49 @@ impl Walls {
         p.resize(p.key.len());
     }
 
-    /// Extrapolates velocities; remembers the weights for the stresses of the same step.
+    /// Extrapolates velocities.
     pub fn fill_motion<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
-        &mut self,
+        &self,
         p: &mut Particles<D, N>,
         neighbors: &Neighbors,
         pairs: Pairs,
     ) {
-        weights::<D, N, K>(p, neighbors, pairs, &mut self.weights);
-        for (wall, parity) in self.parities.iter().enumerate() {
-            let mut v = S::to_disk(extrapolate(neighbors, &self.weights, wall, &p.v));
+        let mut velocities = Vec::new();
+        extrapolate::<D, N, K, _>(p, neighbors, pairs, &p.v, &mut velocities);
+        for ((parity, v), kept) in self.parities.iter().zip(velocities).zip(&mut p.v[p.mirror..]) {
+            let mut v = S::to_disk(v);
             for a in 0..3 {
                 v[a] = v[a] * parity.velocity[a] + parity.motion[a];
             }
-            p.v[p.mirror + wall] = S::from_disk(v);
-        }
-    }
-
-    /// Extrapolates a field that does not change across the wall.
-    pub fn extend(&self, mirror: usize, neighbors: &Neighbors, field: &mut [f64]) {
-        for wall in 0..self.parities.len() {
-            field[mirror + wall] = extrapolate(neighbors, &self.weights, wall, field);
+            *kept = S::from_disk(v);
         }
     }
 
     /// Extrapolates stresses.
-    pub fn fill_stress<const D: usize, const N: usize, S: Space<D, N>>(
+    pub fn fill_stress<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
         &self,
         p: &mut Particles<D, N>,
         neighbors: &Neighbors,
+        pairs: Pairs,
     ) {
-        for (wall, parity) in self.parities.iter().enumerate() {
-            let stress = S::stress_to_disk(extrapolate(neighbors, &self.weights, wall, &p.stress));
-            p.stress[p.mirror + wall] = S::stress_from_disk(reflect_stress(stress, parity.reflected));
+        let mut stresses = Vec::new();
+        extrapolate::<D, N, K, _>(p, neighbors, pairs, &p.stress, &mut stresses);
+        for ((parity, stress), kept) in self.parities.iter().zip(stresses).zip(&mut p.stress[p.mirror..]) {
+            *kept = S::stress_from_disk(reflect_stress(S::stress_to_disk(stress), parity.reflected));
         }
     }
+}
+
+/// Extrapolates a field that does not change across a wall.
+pub fn extend<const D: usize, const N: usize, K: Kernel, F: Parts<Number = f64> + Default>(
+    p: &Particles<D, N>,
+    neighbors: &Neighbors,
+    pairs: Pairs,
+    field: &mut [F],
+) {
+    let mut values = Vec::new();
+    extrapolate::<D, N, K, _>(p, neighbors, pairs, field, &mut values);
+    field[p.mirror..].copy_from_slice(&values);
 }
 
 fn unique(sites: &mut Vec<(u64, Site)>) {

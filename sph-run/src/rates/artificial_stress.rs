@@ -1,11 +1,14 @@
 //! Artificial stress against clumping in tension (Monaghan 2000; Gray, Monaghan & Swift 2001; Bui et al. 2008).
 
 use crate::algebra::{Sym, Vector, tensile_part};
+use crate::lanes::Lanes;
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 use crate::physics::Kernel;
+use crate::rates::momentum::Traction;
 use crate::space::Space;
-use crate::sweep::{Pairs, Scales, around};
+use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
+use std::marker::PhantomData;
 
 /// The stress that holds particles apart: -epsilon w times the tensile principal stresses, of every particle.
 pub fn opposing<const D: usize, const N: usize, S: Space<D, N>>(
@@ -30,21 +33,47 @@ pub fn artificial_stress<const D: usize, const N: usize, S: Space<D, N>, K: Kern
     opposing: &[Sym<N>],
     acceleration: &mut [Vector<D>],
 ) {
-    let scales = Scales::new::<D, K>(pairs.h);
-    let near = scales.value::<K>(pairs.spacing * pairs.spacing);
-    let exponent = scales.value::<K>(0.0) / near;
+    let mut force = vec![Vector::default(); particles.owned];
+    let shape = |r: f64| K::KIND.shape(r / pairs.h);
+    let near = K::KIND.norm(D) / pairs.h.powi(D as i32) * shape(pairs.spacing);
+    let exponent = shape(0.0) / shape(pairs.spacing);
+    let sums = Repulsion { volume: &particles.volume, opposing, near, exponent, force: &mut force, space: PhantomData };
+    let mut sums: Repulsion<'_, D, N, S> = sums;
+    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
     for (i, acceleration) in acceleration.iter_mut().enumerate() {
-        let own = opposing[i];
-        let metric = S::metric(particles.x[i], pairs.spacing);
-        let mut sum = Vector::default();
-        around(particles, &neighbors.support, i, |pair| {
-            let both = own + opposing[pair.j];
+        *acceleration += force[i] * (1.0 / (particles.density[i] * S::metric(particles.x[i], pairs.spacing)));
+    }
+}
+
+struct Repulsion<'a, const D: usize, const N: usize, S> {
+    volume: &'a [f64],
+    opposing: &'a [Sym<N>],
+    /// W(dx)
+    near: f64,
+    exponent: f64,
+    force: &'a mut [Vector<D>],
+    space: PhantomData<S>,
+}
+
+impl<const D: usize, const N: usize, S: Space<D, N>> Sums<D, f64> for Repulsion<'_, D, N, S> {
+    const NEEDS: Needs = Needs { value: true, ..Needs::SLOPE };
+
+    #[inline(always)]
+    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+        let own = block.own(self.opposing);
+        let in_tension = block.any_lane(self.opposing, |opposing| *opposing != Sym::default());
+        let zero = block.number(0.0);
+        let mut sum: Vector<D, L> = block.zero();
+        for pair in pairs {
+            let other = &self.opposing[pair.j];
             // Most pairs are not in tension, and powers are dear.
-            if both != Sym::default() {
-                let f = (scales.value::<K>(pair.r2()) / near).powf(exponent);
-                sum += S::traction(&both, pair.d) * (f * particles.volume[pair.j] * pair.slope);
+            if in_tension || *other != Sym::default() {
+                let value = pair.value;
+                let f = block.lanes(|k| (value.lane(k) / self.near).powf(self.exponent));
+                let weight = f * block.same(self.volume[pair.j]) * pair.slope;
+                sum += <Sym<N> as Traction<D, N, f64>>::on::<S, L>(own, block.all(other), zero, pair.d * weight);
             }
-        });
-        *acceleration += sum * (1.0 / (particles.density[i] * metric));
+        }
+        block.put(self.force, sum);
     }
 }

@@ -1,9 +1,11 @@
 //! The tensor that makes a gradient exact for linear fields.
 
 use crate::algebra::Matrix;
+use crate::lanes::Lanes;
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
-use crate::sweep::around;
+use crate::physics::Kernel;
+use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
 
 /// Largest norm sqrt(L:L) of a correction. Beyond it a particle has hardly any neighbours, or all in a row or a plane, and
 /// gets the unit tensor: it would amplify noise, and swing too fast for the time step. Inside the norm is sqrt(D), on flat
@@ -32,24 +34,42 @@ impl Among {
 
 /// L_i = (sum_j V_j x_ji (x) grad_i W_ij)^-1 of every owned particle, symmetric (Randles & Libersky 1996; Yang et al. 2020,
 /// Eq 26).
-pub fn correction<const D: usize, const N: usize>(
+pub fn correction<const D: usize, const N: usize, K: Kernel>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
+    pairs: Pairs,
     among: Among,
     correction: &mut Vec<Matrix<D>>,
 ) {
-    let end = among.end(particles);
     correction.clear();
-    for i in 0..particles.owned {
-        let mut sum = Matrix::default();
-        around(particles, &neighbors.support, i, |pair| {
-            if pair.j < end {
-                sum.add_outer(-particles.volume[pair.j] * pair.slope, pair.d, pair.d);
-            }
-        });
-        let inverse = sum.inverse(sum.determinant());
+    correction.resize(particles.owned, Matrix::default());
+    let mut sums = Moments { volume: &particles.volume, end: among.end(particles), moments: correction };
+    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    for moment in correction {
+        let inverse = moment.inverse(moment.determinant());
         // Not a number where the determinant is 0: no comparison holds.
         let sound = inverse.0.iter().flatten().map(|l| l * l).sum::<f64>() <= LARGEST * LARGEST;
-        correction.push(if sound { inverse } else { Matrix::unit() });
+        *moment = if sound { inverse } else { Matrix::unit() };
+    }
+}
+
+/// sum_j V_j x_ji (x) grad_i W_ij
+struct Moments<'a, const D: usize> {
+    volume: &'a [f64],
+    end: usize,
+    moments: &'a mut [Matrix<D>],
+}
+
+impl<const D: usize> Sums<D, f64> for Moments<'_, D> {
+    const NEEDS: Needs = Needs::SLOPE;
+
+    #[inline(always)]
+    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+        let mut sum: Matrix<D, L> = block.zero();
+        for pair in pairs.filter(|pair| pair.j < self.end) {
+            let weight = block.same(-self.volume[pair.j]) * pair.slope;
+            sum.add_outer(pair.d * weight, pair.d);
+        }
+        block.put(self.moments, sum);
     }
 }

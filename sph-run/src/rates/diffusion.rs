@@ -1,38 +1,60 @@
 //! Diffusion that takes noise out of a field and leaves linear fields as they are.
 
-use crate::algebra::{Matrix, Vector};
+use crate::algebra::Matrix;
+use crate::lanes::{Lanes, Parts};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
-use crate::sweep::around;
-use std::ops::{Add, Mul, Sub};
+use crate::physics::Kernel;
+use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
 
 /// What can diffuse: density, stress.
-pub trait Diffusing: Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self> {}
-impl<T: Copy + Default + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>> Diffusing for T {}
+pub trait Diffusing: Parts<Number = f64> + Default {}
+impl<F: Parts<Number = f64> + Default> Diffusing for F {}
 
 /// Gradient of a field at every owned particle, component by component: sum_j V_j (f_j - f_i) L_i grad_i W_ij over the
 /// material (Yang et al. 2020, Eq 25).
-pub fn gradient<const D: usize, const N: usize, T: Diffusing>(
+pub fn gradient<const D: usize, const N: usize, K: Kernel, F: Diffusing>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
+    pairs: Pairs,
     correction: &[Matrix<D>],
-    field: &[T],
-    gradient: &mut Vec<[T; D]>,
+    field: &[F],
+    gradient: &mut Vec<[F; D]>,
 ) {
     gradient.clear();
-    for i in 0..particles.owned {
-        let own = field[i];
-        let mut sum = [T::default(); D];
-        around(particles, &neighbors.support, i, |pair| {
-            if pair.j < particles.mirror {
-                let difference = (field[pair.j] - own) * (particles.volume[pair.j] * pair.slope);
-                for a in 0..D {
-                    sum[a] = sum[a] + difference * pair.d.0[a];
-                }
+    gradient.resize(particles.owned, [F::default(); D]);
+    let mut sums = Gradient { volume: &particles.volume, end: particles.mirror, field, gradient };
+    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    for (gradient, Matrix(l)) in gradient.iter_mut().zip(correction) {
+        let plain = *gradient;
+        *gradient =
+            std::array::from_fn(|a| F::from_parts(|k| (0..D).fold(0.0, |sum, b| sum + plain[b].part(k) * l[a][b])));
+    }
+}
+
+struct Gradient<'a, const D: usize, F> {
+    volume: &'a [f64],
+    end: usize,
+    field: &'a [F],
+    gradient: &'a mut [[F; D]],
+}
+
+impl<const D: usize, F: Diffusing> Sums<D, f64> for Gradient<'_, D, F> {
+    const NEEDS: Needs = Needs::SLOPE;
+
+    #[inline(always)]
+    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+        let own = block.own(self.field);
+        let mut sum: [F::With<L>; D] = block.zero();
+        for pair in pairs.filter(|pair| pair.j < self.end) {
+            let weight = block.same(self.volume[pair.j]) * pair.slope;
+            let other = block.all(&self.field[pair.j]);
+            for a in 0..D {
+                let way = pair.d.0[a] * weight;
+                sum[a] = Parts::from_parts(|k| (other.part(k) - own.part(k)).multiply_add(way, sum[a].part(k)));
             }
-        });
-        let l = &correction[i].0;
-        gradient.push(std::array::from_fn(|a| (0..D).fold(T::default(), |g, b| g + sum[b] * l[a][b])));
+        }
+        block.put(self.gradient, sum);
     }
 }
 
@@ -46,27 +68,51 @@ pub fn gradient<const D: usize, const N: usize, T: Diffusing>(
 /// each component of the stress (Feng et al. 2021). The gradients take out what is linear, so that it does not bend the
 /// profile at a free surface. What one particle gains the other loses: sum V df/dt = 0, with the sections of rings in the
 /// axisymmetric space.
-pub fn diffusion<const D: usize, const N: usize, T: Diffusing>(
+pub fn diffusion<const D: usize, const N: usize, K: Kernel, F: Diffusing>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
+    pairs: Pairs,
     strength: f64,
-    field: &[T],
-    gradient: &[[T; D]],
-    rate: &mut Vec<T>,
+    field: &[F],
+    gradient: &[[F; D]],
+    rate: &mut Vec<F>,
 ) {
-    let along = |g: &[T; D], d: Vector<D>| (0..D).fold(T::default(), |sum, a| sum + g[a] * d.0[a]);
     rate.clear();
-    for i in 0..particles.owned {
-        let (own, slope) = (field[i], gradient[i]);
-        let mut sum = T::default();
-        around(particles, &neighbors.support, i, |pair| {
-            if pair.j < particles.mirror {
-                // x_ji . grad W/r^2 = -slope.
-                let linear = along(&slope, pair.d) + along(&gradient[pair.j], pair.d);
-                let psi = (field[pair.j] - own) * 2.0 + linear;
-                sum = sum - psi * (particles.volume[pair.j] * pair.slope);
-            }
-        });
-        rate.push(sum * strength);
+    rate.resize(particles.owned, F::default());
+    let mut sums = Diffusion { volume: &particles.volume, end: particles.mirror, strength, field, gradient, rate };
+    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+}
+
+struct Diffusion<'a, const D: usize, F> {
+    volume: &'a [f64],
+    end: usize,
+    strength: f64,
+    field: &'a [F],
+    gradient: &'a [[F; D]],
+    rate: &'a mut [F],
+}
+
+impl<const D: usize, F: Diffusing> Sums<D, f64> for Diffusion<'_, D, F> {
+    const NEEDS: Needs = Needs::SLOPE;
+
+    #[inline(always)]
+    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+        let (own, slope) = (block.own(self.field), block.own(self.gradient));
+        let two = block.number(2.0);
+        let mut sum: F::With<L> = block.zero();
+        for pair in pairs.filter(|pair| pair.j < self.end) {
+            // x_ji . grad W/r^2 = -slope.
+            let weight = block.same(-self.volume[pair.j]) * pair.slope;
+            let (other, slope_there) = (block.all(&self.field[pair.j]), block.all(&self.gradient[pair.j]));
+            sum = Parts::from_parts(|k| {
+                let mut psi = (other.part(k) - own.part(k)) * two;
+                for a in 0..D {
+                    psi = (slope[a].part(k) + slope_there[a].part(k)).multiply_add(pair.d.0[a], psi);
+                }
+                psi.multiply_add(weight, sum.part(k))
+            });
+        }
+        let strength = block.number(self.strength);
+        block.put(self.rate, Parts::from_parts(|k| sum.part(k) * strength));
     }
 }

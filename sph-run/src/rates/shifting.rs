@@ -1,9 +1,11 @@
 //! Shifting of particles towards an even arrangement, inside the body only.
 
 use crate::algebra::Vector;
+use crate::lanes::Lanes;
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
-use crate::sweep::{Pairs, around};
+use crate::physics::Kernel;
+use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
 
 /// Constant A of Skillen, Lind, Stansby & Rogers (2013) where the scene asks for shifting = 1.
 const STRENGTH: f64 = 2.0;
@@ -14,18 +16,38 @@ const INSIDE: f64 = 0.85;
 const LARGEST: f64 = 0.05;
 
 /// 1 for the owned particles at a free surface, 0 for all others.
-pub fn surface<const D: usize, const N: usize>(
+pub fn surface<const D: usize, const N: usize, K: Kernel>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
+    pairs: Pairs,
     surface: &mut Vec<f64>,
 ) {
     surface.clear();
-    for i in 0..particles.owned {
-        let mut divergence = 0.0;
-        around(particles, &neighbors.support, i, |pair| {
-            divergence -= pair.r2() * particles.volume[pair.j] * pair.slope;
-        });
-        surface.push(if divergence < INSIDE * D as f64 { 1.0 } else { 0.0 });
+    surface.resize(particles.owned, 0.0);
+    let mut sums = Divergence { volume: &particles.volume, divergence: surface };
+    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    for divergence in surface {
+        *divergence = if *divergence < INSIDE * D as f64 { 1.0 } else { 0.0 };
+    }
+}
+
+/// sum_j V_j x_ji . grad_i W_ij
+struct Divergence<'a> {
+    volume: &'a [f64],
+    divergence: &'a mut [f64],
+}
+
+impl<const D: usize> Sums<D, f64> for Divergence<'_> {
+    const NEEDS: Needs = Needs::SLOPE;
+
+    #[inline(always)]
+    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+        let mut sum = block.number(0.0);
+        for pair in pairs {
+            let weight = block.same(-self.volume[pair.j]) * pair.slope;
+            sum = pair.d.norm2().multiply_add(weight, sum);
+        }
+        block.put(self.divergence, sum);
     }
 }
 
@@ -43,7 +65,7 @@ pub struct Shifting<'a> {
 /// The shift of every owned particle in a step, m: -A h |v| dt grad C with the concentration gradient
 /// grad C = sum_j V_j grad_i W_ij (Lind et al. 2012; Skillen et al. 2013). 0 where the support reaches a free surface: there
 /// the gradient points into the body whatever the arrangement, and would press layers against the outermost one.
-pub fn shift<const D: usize, const N: usize>(
+pub fn shift<const D: usize, const N: usize, K: Kernel>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
     pairs: Pairs,
@@ -52,15 +74,39 @@ pub fn shift<const D: usize, const N: usize>(
 ) {
     let Shifting { strength, dt, surface } = shifting;
     shift.clear();
-    for i in 0..particles.owned {
-        let mut concentration = Vector::<D>::default();
-        let mut open = surface[i];
-        around(particles, &neighbors.support, i, |pair| {
-            concentration += pair.d * (particles.volume[pair.j] * pair.slope);
-            open += surface[pair.j];
-        });
-        let way = concentration * (-STRENGTH * strength * pairs.h * particles.v[i].norm() * dt);
+    shift.resize(particles.owned, Vector::default());
+    let mut open = vec![0.0; particles.owned];
+    let mut sums = Concentration { volume: &particles.volume, surface, gradient: shift, open: &mut open };
+    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    for (i, shift) in shift.iter_mut().enumerate() {
+        let way = *shift * (-STRENGTH * strength * pairs.h * particles.v[i].norm() * dt);
         let scale = (LARGEST * pairs.spacing / way.norm().max(f64::MIN_POSITIVE)).min(1.0);
-        shift.push(if open > 0.0 { Vector::default() } else { way * scale });
+        *shift = if open[i] > 0.0 { Vector::default() } else { way * scale };
+    }
+}
+
+/// grad C, and where the support reaches a free surface.
+struct Concentration<'a, const D: usize> {
+    volume: &'a [f64],
+    surface: &'a [f64],
+    gradient: &'a mut [Vector<D>],
+    open: &'a mut [f64],
+}
+
+impl<const D: usize> Sums<D, f64> for Concentration<'_, D> {
+    const NEEDS: Needs = Needs { value: true, ..Needs::SLOPE };
+
+    #[inline(always)]
+    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+        let mut sum: Vector<D, L> = block.zero();
+        let mut open = block.own_numbers(self.surface);
+        for pair in pairs {
+            let weight = block.same(self.volume[pair.j]) * pair.slope;
+            sum.add_scaled(weight, pair.d);
+            // Of candidates outside the support none counts.
+            open = pair.value.multiply_add(block.same(self.surface[pair.j]), open);
+        }
+        block.put(self.gradient, sum);
+        block.put(self.open, open);
     }
 }

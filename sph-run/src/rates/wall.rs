@@ -1,44 +1,48 @@
 //! Extrapolation of the material's state to wall particles (Yang et al. 2020, Eqs 27-32).
 
+use crate::lanes::{Lanes, Parts};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 use crate::physics::Kernel;
-use crate::sweep::{Pairs, Scales, values};
+use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
 
-/// Shepard weights V_j W_wj / sum V_k W_wk of the material around every wall particle, in the order of its list.
-/// All zero where no material is in reach.
-pub fn weights<const D: usize, const N: usize, K: Kernel>(
+/// Shepard's interpolation of a field at every wall particle, sum_j V_j W_wj f_j/sum_j V_j W_wj over the material; zero where
+/// no material is in reach. `field` holds all particles of the material, and may hold more.
+pub fn extrapolate<const D: usize, const N: usize, K: Kernel, F: Parts<Number = f64> + Default>(
     particles: &Particles<D, N>,
     neighbors: &Neighbors,
     pairs: Pairs,
-    weights: &mut Vec<f64>,
+    field: &[F],
+    at_walls: &mut Vec<F>,
 ) {
-    let scales = Scales::new::<D, K>(pairs.h);
-    weights.clear();
-    for wall in 0..neighbors.of_wall.len() {
-        let first = weights.len();
-        let mut sum = 0.0;
-        values::<D, N, K>(particles, neighbors.of_wall.of(wall), scales, particles.mirror + wall, |j, value| {
-            let weight = particles.volume[j] * value;
-            sum += weight;
-            weights.push(weight);
-        });
-        if sum > 0.0 {
-            for weight in &mut weights[first..] {
-                *weight /= sum;
-            }
-        }
-    }
+    at_walls.clear();
+    at_walls.resize(particles.len() - particles.mirror, F::default());
+    let sweep = Sweep { places: &particles.x[..], lists: &neighbors.of_wall, first: particles.mirror };
+    sweep.run::<D, f64, K>(pairs, &mut Shepard { volume: &particles.volume, field, first: particles.mirror, at_walls });
 }
 
-/// Sum over the material around wall particle `wall` of weight times `field`.
-pub fn extrapolate<T: Copy + Default + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>>(
-    neighbors: &Neighbors,
-    weights: &[f64],
-    wall: usize,
-    field: &[T],
-) -> T {
-    let first = neighbors.of_wall.start(wall);
-    let list = neighbors.of_wall.of(wall).iter().zip(&weights[first..]);
-    list.fold(T::default(), |sum, (&j, &weight)| sum + field[j as usize] * weight)
+struct Shepard<'a, F> {
+    volume: &'a [f64],
+    field: &'a [F],
+    first: usize,
+    at_walls: &'a mut [F],
+}
+
+impl<const D: usize, F: Parts<Number = f64>> Sums<D, f64> for Shepard<'_, F> {
+    const NEEDS: Needs = Needs::VALUE;
+
+    #[inline(always)]
+    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+        let mut weights = block.number(0.0);
+        let mut sum: F::With<L> = block.zero();
+        for pair in pairs {
+            let weight = pair.value * block.same(self.volume[pair.j]);
+            let value = block.all(&self.field[pair.j]);
+            weights = weights + weight;
+            sum = Parts::from_parts(|k| value.part(k).multiply_add(weight, sum.part(k)));
+        }
+        // 0/smallest where no material is in reach.
+        let weights = weights.largest(block.number(f64::MIN_POSITIVE));
+        block.put_from(self.first, self.at_walls, Parts::from_parts(|k| sum.part(k).over(weights)));
+    }
 }

@@ -1,0 +1,383 @@
+//! Numbers of several particles at once: one lane of a vector register for each.
+//!
+//! A lane never meets another, and every operation is the IEEE one (multiply_add with one rounding), so what comes out does
+//! not depend on how many lanes the processor has: the bits are the same with AVX-512, with AVX2, and without either, where
+//! a fused multiply-add is a function of the mathematical library, correct and slow.
+
+use crate::algebra::{Matrix, Number, Sym, Vector};
+use pulp::{Arch, Simd, WithSimd};
+use std::fmt;
+use std::ops::{Add, Mul, Neg, Sub};
+
+/// Instructions for lanes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Instructions {
+    /// 8 lanes of f64, 16 of f32 (the level x86-64-v4).
+    Avx512,
+    /// 4 lanes of f64, 8 of f32 (x86-64-v3).
+    Avx2,
+    /// One lane, on any processor.
+    Portable,
+}
+
+impl Instructions {
+    /// The most that this processor has.
+    pub fn best() -> Self {
+        [Self::Avx512, Self::Avx2].into_iter().find(|it| it.arch().is_some()).unwrap_or(Self::Portable)
+    }
+
+    /// Does this processor have them?
+    pub fn are_there(self) -> bool {
+        self.arch().is_some()
+    }
+
+    fn arch(self) -> Option<Arch> {
+        #[cfg(target_arch = "x86_64")]
+        match self {
+            Self::Avx512 => return pulp::x86::V4::try_new().map(Arch::V4),
+            Self::Avx2 => return pulp::x86::V3::try_new().map(Arch::V3),
+            Self::Portable => {}
+        }
+        (self == Self::Portable).then_some(Arch::Scalar)
+    }
+
+    /// Particles of a block: lanes of numbers of `size` bytes.
+    pub fn block(self, size: usize) -> usize {
+        match self {
+            Self::Avx512 => 64 / size,
+            Self::Avx2 | Self::Portable => 32 / size,
+        }
+    }
+
+    /// Runs a job compiled for these instructions.
+    #[inline(always)]
+    pub fn run<J: WithSimd>(self, job: J) -> J::Output {
+        self.arch().expect("instructions were checked when they were chosen").dispatch(job)
+    }
+}
+
+impl fmt::Display for Instructions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Avx512 => "AVX-512",
+            Self::Avx2 => "AVX2",
+            Self::Portable => "portable",
+        })
+    }
+}
+
+/// What lanes can be made of: f64 or f32.
+pub trait Element: Part + Default + Send + Sync + 'static {
+    /// As many of them as the instructions S take at once.
+    type Lanes<S: Simd>: Lanes<Element = Self, Token = S>;
+    fn of(x: f64) -> Self;
+    fn wide(self) -> f64;
+}
+
+/// One number for each particle of a block.
+pub trait Lanes: Part {
+    type Element: Element;
+    /// Proof that the processor has the instructions.
+    type Token: Simd;
+    /// How many.
+    const LANES: usize;
+    /// The same number in all lanes.
+    fn all(token: Self::Token, x: Self::Element) -> Self;
+    /// The numbers `of(0), of(1), ..`.
+    fn each(token: Self::Token, of: impl FnMut(usize) -> Self::Element) -> Self;
+    /// The number in a lane.
+    fn lane(&self, k: usize) -> Self::Element;
+    fn over(self, divisor: Self) -> Self;
+    /// 1/sqrt(x) within 3.5 %, for x that is neither zero nor subnormal. Root and division take as long as thirty
+    /// multiplications, and the estimates that processors offer differ between makers.
+    fn rough_inverse_root(self) -> Self;
+    /// Times which [`Lanes::closer_inverse_root`] takes the rough estimate to within two units in the last place.
+    const REFINEMENTS: usize;
+    /// 1/sqrt(x) from an estimate.
+    fn closer_inverse_root(self, estimate: Self) -> Self;
+    fn least(self, other: Self) -> Self;
+    fn largest(self, other: Self) -> Self;
+    /// Is the number below the other's in any lane?
+    fn any_below(self, other: Self) -> bool;
+
+    /// |x|
+    #[inline(always)]
+    fn size(self) -> Self {
+        self.largest(-self)
+    }
+}
+
+/// (1 - e)^(-1/2) - 1 over e.
+const SERIES: [f64; 3] = [0.5, 0.375, 0.3125];
+
+/// A first estimate of 1/sqrt(x): halves the exponent and changes its sign, by arithmetic on the bits. Of an f64 the high
+/// word decides; what the same arithmetic makes of the low one is not seen.
+trait Estimate: Simd {
+    #[inline(always)]
+    fn estimate_f32s(self, x: Self::f32s) -> Self::f32s {
+        let half = self.wrapping_dyn_shr_u32s(self.transmute_u32s_f32s(x), self.splat_u32s(1));
+        self.transmute_f32s_u32s(self.sub_u32s(self.splat_u32s(0x5f37_5a86), half))
+    }
+
+    #[inline(always)]
+    fn estimate_f64s(self, x: Self::f64s) -> Self::f64s {
+        const MAGIC: u32 = 0x5fe6_eb50;
+        if Self::IS_SCALAR {
+            let bits: u64 = pulp::bytemuck::cast(x);
+            let word = |shift: u32| u64::from(MAGIC.wrapping_sub((bits >> shift) as u32 >> 1)) << shift;
+            pulp::bytemuck::cast(word(32) | word(0))
+        } else {
+            let half = self.wrapping_dyn_shr_u32s(pulp::bytemuck::cast(x), self.splat_u32s(1));
+            pulp::bytemuck::cast(self.sub_u32s(self.splat_u32s(MAGIC), half))
+        }
+    }
+}
+impl<S: Simd> Estimate for S {}
+
+macro_rules! lanes {
+    ($name:ident, $element:ty, $lanes:ident, $count:ident, $splat:ident, $add:ident, $sub:ident, $mul:ident, $neg:ident,
+     $fma:ident, $div:ident, $min:ident, $max:ident, $less:ident, $first:ident, $estimate:ident, $terms:literal) => {
+        /// Lanes of the instructions S.
+        #[derive(Clone, Copy, Debug)]
+        pub struct $name<S: Simd>(S, S::$lanes);
+
+        impl<S: Simd> Add for $name<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, other: Self) -> Self {
+                Self(self.0, self.0.$add(self.1, other.1))
+            }
+        }
+        impl<S: Simd> Sub for $name<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                Self(self.0, self.0.$sub(self.1, other.1))
+            }
+        }
+        impl<S: Simd> Mul for $name<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                Self(self.0, self.0.$mul(self.1, other.1))
+            }
+        }
+        impl<S: Simd> Neg for $name<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self(self.0, self.0.$neg(self.1))
+            }
+        }
+        impl<S: Simd> Number for $name<S> {
+            #[inline(always)]
+            fn multiply_add(self, factor: Self, addend: Self) -> Self {
+                Self(self.0, self.0.$fma(self.1, factor.1, addend.1))
+            }
+        }
+        impl<S: Simd> Lanes for $name<S> {
+            type Element = $element;
+            type Token = S;
+            const LANES: usize = S::$count;
+            #[inline(always)]
+            fn all(token: S, x: $element) -> Self {
+                Self(token, token.$splat(x))
+            }
+            #[inline(always)]
+            fn each(token: S, mut of: impl FnMut(usize) -> $element) -> Self {
+                let mut lanes = token.$splat(0.0);
+                for (k, x) in pulp::bytemuck::cast_slice_mut(std::slice::from_mut(&mut lanes)).iter_mut().enumerate() {
+                    *x = of(k);
+                }
+                Self(token, lanes)
+            }
+            #[inline(always)]
+            fn lane(&self, k: usize) -> $element {
+                pulp::bytemuck::cast_slice(std::slice::from_ref(&self.1))[k]
+            }
+            #[inline(always)]
+            fn over(self, divisor: Self) -> Self {
+                Self(self.0, self.0.$div(self.1, divisor.1))
+            }
+            #[inline(always)]
+            fn rough_inverse_root(self) -> Self {
+                Self(self.0, self.0.$estimate(self.1))
+            }
+            const REFINEMENTS: usize = 2;
+            #[inline(always)]
+            fn closer_inverse_root(self, y: Self) -> Self {
+                let number = |x: f64| Self(self.0, self.0.$splat(x as $element));
+                // y (1 + e/2 + 3/8 e^2 + 5/16 e^3 ..) with e = 1 - x y^2.
+                let e = (-(self * y)).multiply_add(y, number(1.0));
+                let mut series = number(SERIES[$terms - 1]);
+                for term in (0..$terms - 1).rev() {
+                    series = series.multiply_add(e, number(SERIES[term]));
+                }
+                (y * e).multiply_add(series, y)
+            }
+            #[inline(always)]
+            fn least(self, other: Self) -> Self {
+                Self(self.0, self.0.$min(self.1, other.1))
+            }
+            #[inline(always)]
+            fn largest(self, other: Self) -> Self {
+                Self(self.0, self.0.$max(self.1, other.1))
+            }
+            #[inline(always)]
+            fn any_below(self, other: Self) -> bool {
+                self.0.$first(self.0.$less(self.1, other.1)) < Self::LANES
+            }
+        }
+        impl<S: Simd> Parts for $name<S> {
+            const COUNT: usize = 1;
+            type Number = Self;
+            type With<T: Part> = T;
+            #[inline(always)]
+            fn from_parts(mut part: impl FnMut(usize) -> Self) -> Self {
+                part(0)
+            }
+            #[inline(always)]
+            fn part(&self, _: usize) -> Self {
+                *self
+            }
+        }
+        impl Element for $element {
+            type Lanes<S: Simd> = $name<S>;
+            #[inline(always)]
+            fn of(x: f64) -> Self {
+                x as Self
+            }
+            #[inline(always)]
+            fn wide(self) -> f64 {
+                f64::from(self)
+            }
+        }
+        impl Parts for $element {
+            const COUNT: usize = 1;
+            type Number = Self;
+            type With<T: Part> = T;
+            #[inline(always)]
+            fn from_parts(mut part: impl FnMut(usize) -> Self) -> Self {
+                part(0)
+            }
+            #[inline(always)]
+            fn part(&self, _: usize) -> Self {
+                *self
+            }
+        }
+    };
+}
+lanes!(
+    Doubles,
+    f64,
+    f64s,
+    F64_LANES,
+    splat_f64s,
+    add_f64s,
+    sub_f64s,
+    mul_f64s,
+    neg_f64s,
+    mul_add_f64s,
+    div_f64s,
+    min_f64s,
+    max_f64s,
+    less_than_f64s,
+    first_true_m64s,
+    estimate_f64s,
+    3
+);
+lanes!(
+    Singles,
+    f32,
+    f32s,
+    F32_LANES,
+    splat_f32s,
+    add_f32s,
+    sub_f32s,
+    mul_f32s,
+    neg_f32s,
+    mul_add_f32s,
+    div_f32s,
+    min_f32s,
+    max_f32s,
+    less_than_f32s,
+    first_true_m32s,
+    estimate_f32s,
+    2
+);
+
+/// A field's value, number by number: so it can be had of one particle in all lanes, or of one particle in each.
+pub trait Parts: Copy {
+    /// How many numbers.
+    const COUNT: usize;
+    type Number: Number;
+    /// The same kind of value of other numbers.
+    type With<T: Part>: Parts<Number = T>;
+    fn from_parts(part: impl FnMut(usize) -> Self::Number) -> Self;
+    fn part(&self, k: usize) -> Self::Number;
+}
+
+/// A number as the only part of itself.
+pub trait Part: Number + Parts<Number = Self> {}
+impl<T: Number + Parts<Number = T>> Part for T {}
+
+macro_rules! parts {
+    ($name:ident) => {
+        impl<const N: usize, T: Part> Parts for $name<N, T> {
+            const COUNT: usize = N;
+            type Number = T;
+            type With<U: Part> = $name<N, U>;
+            #[inline(always)]
+            fn from_parts(mut part: impl FnMut(usize) -> T) -> Self {
+                let mut parts = [part(0); N];
+                for k in 1..N {
+                    parts[k] = part(k);
+                }
+                Self(parts)
+            }
+            #[inline(always)]
+            fn part(&self, k: usize) -> T {
+                self.0[k]
+            }
+        }
+    };
+}
+parts!(Vector);
+parts!(Sym);
+
+impl<const D: usize, T: Part> Parts for Matrix<D, T> {
+    const COUNT: usize = D * D;
+    type Number = T;
+    type With<U: Part> = Matrix<D, U>;
+    #[inline(always)]
+    fn from_parts(mut part: impl FnMut(usize) -> T) -> Self {
+        let mut parts = [[part(0); D]; D];
+        for k in 1..Self::COUNT {
+            parts[k / D][k % D] = part(k);
+        }
+        Self(parts)
+    }
+    #[inline(always)]
+    fn part(&self, k: usize) -> T {
+        self.0[k / D][k % D]
+    }
+}
+
+/// Several values, part by part of each.
+impl<const M: usize, F: Parts> Parts for [F; M] {
+    const COUNT: usize = M * F::COUNT;
+    type Number = F::Number;
+    type With<U: Part> = [F::With<U>; M];
+    #[inline(always)]
+    fn from_parts(mut part: impl FnMut(usize) -> F::Number) -> Self {
+        let mut values = [F::from_parts(&mut part); M];
+        for m in 1..M {
+            values[m] = F::from_parts(|k| part(m * F::COUNT + k));
+        }
+        values
+    }
+    #[inline(always)]
+    fn part(&self, k: usize) -> F::Number {
+        self[k / F::COUNT].part(k % F::COUNT)
+    }
+}
