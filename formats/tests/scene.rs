@@ -152,6 +152,7 @@ fn numerics() -> Numerics {
         artificial_stress: 0.0,
         gradient_correction: false,
         shifting: 0.0,
+        precision: Precision::Double,
     }
 }
 

@@ -133,6 +133,7 @@ fn plain() -> Numerics {
         artificial_stress: 0.0,
         gradient_correction: false,
         shifting: 0.0,
+        precision: Precision::Double,
     }
 }
 
@@ -207,6 +208,7 @@ fn every_key_of_the_numerics_is_read() {
         artificial_stress: 0.5,
         gradient_correction: true,
         shifting: 0.6,
+        precision: Precision::Double,
     };
     assert_eq!(good(SOIL, "courant", keys).numerics, expected);
     let keys = "viscous-courant = 0.2\nviscosity = 0.1\nviscosity-acts = \"approach\"\ndensity-diffusion = 0\n\

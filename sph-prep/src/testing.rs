@@ -40,6 +40,7 @@ pub fn scene(space: Space, spacing: f64, shape: Shape) -> Scene {
             artificial_stress: 0.0,
             gradient_correction: false,
             shifting: 0.0,
+            precision: Precision::Double,
         },
         end: End { time: 1.0, at_rest: None },
         output: Output { snapshots: 0.05, history: 0.01 },

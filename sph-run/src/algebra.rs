@@ -37,9 +37,9 @@ pub struct Matrix<const D: usize, T = f64>(pub [[T; D]; D]);
 
 macro_rules! componentwise {
     ($name:ident) => {
-        impl<const N: usize> Default for $name<N> {
+        impl<const N: usize, T: Number + Default> Default for $name<N, T> {
             fn default() -> Self {
-                Self([0.0; N])
+                Self([T::default(); N])
             }
         }
         impl<const N: usize, T: Number> Add for $name<N, T> {
@@ -182,6 +182,16 @@ impl<const D: usize, T: Number> Matrix<D, T> {
             product.0[a] = Vector(self.0[a]).dot(v);
         }
         product
+    }
+    /// Matrix times number.
+    #[inline(always)]
+    pub fn times_number(mut self, factor: T) -> Self {
+        for a in 0..D {
+            for b in 0..D {
+                self.0[a][b] = self.0[a][b] * factor;
+            }
+        }
+        self
     }
     /// Adds `a (x) b`.
     #[inline(always)]

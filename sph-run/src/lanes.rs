@@ -5,8 +5,10 @@
 //! a fused multiply-add is a function of the mathematical library, correct and slow.
 
 use crate::algebra::{Matrix, Number, Sym, Vector};
+use crate::neighbors::Neighbors;
+use crate::sweep::Mover;
 use pulp::{Arch, Simd, WithSimd};
-use std::fmt;
+use std::fmt::{self, Debug};
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// Instructions for lanes.
@@ -67,15 +69,48 @@ impl fmt::Display for Instructions {
 }
 
 /// What lanes can be made of: f64 or f32.
-pub trait Element: Part + Default + Send + Sync + 'static {
+pub trait Element: Part + Debug + Default + Send + Sync + 'static {
     /// As many of them as the instructions S take at once.
     type Lanes<S: Simd>: Lanes<Element = Self, Token = S>;
+    /// A place, as precise as a difference of two of them needs it.
+    type Place<const D: usize>: Place<D, Self>;
+    /// A place x, over a unit of length.
+    fn place<const D: usize>(x: Vector<D>, unit: f64) -> Self::Place<D>;
+    /// The unit of length of places for a smoothing length h: powers of lengths must not leave the range of f32.
+    fn unit(h: f64) -> f64;
+    /// The particles in such numbers.
+    fn movers<const D: usize>(neighbors: &Neighbors<D>) -> &[Mover<D, Self>];
     fn of(x: f64) -> Self;
     fn wide(self) -> f64;
 }
 
+/// A place, from which a difference can be taken.
+pub trait Place<const D: usize, T: Element>: Parts<Number = T> + Debug + Default + Send + Sync + 'static {
+    /// x_i - x_j
+    fn difference<L: Lanes<Element = T>>(own: Self::With<L>, other: Self::With<L>) -> Vector<D, L>;
+}
+
+impl<const D: usize> Place<D, f64> for Vector<D> {
+    #[inline(always)]
+    fn difference<L: Lanes<Element = f64>>(own: Vector<D, L>, other: Vector<D, L>) -> Vector<D, L> {
+        own - other
+    }
+}
+
+/// A place in f32 as a point of a fixed grid and the rest: differences are as good as f32 can hold them, wherever in space
+/// they are taken.
+impl<const D: usize> Place<D, f32> for [Vector<D, f32>; 2] {
+    #[inline(always)]
+    fn difference<L: Lanes<Element = f32>>(own: [Vector<D, L>; 2], other: [Vector<D, L>; 2]) -> Vector<D, L> {
+        (own[0] - other[0]) + (own[1] - other[1])
+    }
+}
+
+/// Points of the grid of places in f32, to a unit of length. Differences between points are exact up to 2^20 units.
+const GRID: f64 = 16.0;
+
 /// One number for each particle of a block.
-pub trait Lanes: Part {
+pub trait Lanes: Part + Debug {
     type Element: Element;
     /// Proof that the processor has the instructions.
     type Token: Simd;
@@ -136,7 +171,7 @@ impl<S: Simd> Estimate for S {}
 
 macro_rules! lanes {
     ($name:ident, $element:ty, $lanes:ident, $count:ident, $splat:ident, $add:ident, $sub:ident, $mul:ident, $neg:ident,
-     $fma:ident, $div:ident, $min:ident, $max:ident, $less:ident, $first:ident, $estimate:ident, $terms:literal) => {
+     $fma:ident, $div:ident, $min:ident, $max:ident, $less:ident, $first:ident, $estimate:ident, $terms:literal, $place:ty, $at:expr, $unit:expr, $movers:ident) => {
         /// Lanes of the instructions S.
         #[derive(Clone, Copy, Debug)]
         pub struct $name<S: Simd>(S, S::$lanes);
@@ -243,6 +278,19 @@ macro_rules! lanes {
         }
         impl Element for $element {
             type Lanes<S: Simd> = $name<S>;
+            type Place<const D: usize> = $place;
+            #[inline(always)]
+            fn place<const D: usize>(x: Vector<D>, unit: f64) -> $place {
+                $at(x, unit)
+            }
+            #[inline(always)]
+            fn unit(h: f64) -> f64 {
+                $unit(h)
+            }
+            #[inline(always)]
+            fn movers<const D: usize>(neighbors: &Neighbors<D>) -> &[Mover<D, Self>] {
+                &neighbors.$movers
+            }
             #[inline(always)]
             fn of(x: f64) -> Self {
                 x as Self
@@ -284,7 +332,11 @@ lanes!(
     less_than_f64s,
     first_true_m64s,
     estimate_f64s,
-    3
+    3,
+    Vector<D>,
+    |x: Vector<D>, _| x,
+    |_| 1.0,
+    movers
 );
 lanes!(
     Singles,
@@ -303,7 +355,14 @@ lanes!(
     less_than_f32s,
     first_true_m32s,
     estimate_f32s,
-    2
+    2,
+    [Vector<D, f32>; 2],
+    |x: Vector<D>, unit: f64| {
+        let parts = x.0.map(|x| (x / unit, (x / unit * GRID).round() / GRID));
+        [Vector(parts.map(|(_, point)| point as f32)), Vector(parts.map(|(x, point)| (x - point) as f32))]
+    },
+    |h| h,
+    singles
 );
 
 /// A field's value, number by number: so it can be had of one particle in all lanes, or of one particle in each.
@@ -380,4 +439,17 @@ impl<const M: usize, F: Parts> Parts for [F; M] {
     fn part(&self, k: usize) -> F::Number {
         self[k / F::COUNT].part(k % F::COUNT)
     }
+}
+
+/// Asks for a value to be brought into the nearest cache.
+#[inline(always)]
+pub fn prefetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: a prefetch reads nothing.
+    unsafe {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
 }

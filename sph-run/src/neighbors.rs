@@ -5,8 +5,10 @@
 //! built, nor on the blocks.
 
 use crate::algebra::Vector;
-use crate::lanes::{Doubles, Instructions, Lanes, Parts};
+use crate::lanes::{Doubles, Element, Lanes, Parts};
 use crate::particles::Particles;
+use crate::physics::Kernel;
+use crate::sweep::{Mover, Pairs, Precision, Sums, Sweep};
 use pulp::{Simd, WithSimd};
 use std::ops::Range;
 
@@ -47,22 +49,44 @@ impl Lists {
 
 /// Neighbour lists of one rank.
 #[derive(Clone, Debug, Default)]
-pub struct Neighbors {
+pub struct Neighbors<const D: usize> {
+    /// All particles, as sweeps need them: see [`Neighbors::refresh`].
+    pub movers: Vec<Mover<D, f64>>,
+    /// The same in f32, where the scene asks for mixed precision.
+    pub singles: Vec<Mover<D, f32>>,
     /// For the owned particles: particles of all ranges.
     pub of_owned: Lists,
     /// For the wall particles: material particles of all ranges but the walls.
     pub of_wall: Lists,
 }
 
-impl Neighbors {
-    /// Lists of all pairs closer than `reach`, for blocks of `block` particles.
-    pub fn build<const D: usize, const N: usize>(
-        &mut self,
-        particles: &Particles<D, N>,
-        reach: f64,
-        block: usize,
-        instructions: Instructions,
-    ) {
+impl<const D: usize> Neighbors<D> {
+    /// Takes over places, velocities and volumes.
+    pub fn refresh<const N: usize>(&mut self, particles: &Particles<D, N>, pairs: Pairs) {
+        self.refresh_from(0, particles, pairs);
+    }
+
+    /// As [`Neighbors::refresh`], of the particles from index `first` on.
+    pub fn refresh_from<const N: usize>(&mut self, first: usize, particles: &Particles<D, N>, pairs: Pairs) {
+        movers(first, particles, f64::unit(pairs.h), &mut self.movers);
+        if pairs.precision == Precision::Mixed {
+            movers(first, particles, f32::unit(pairs.h), &mut self.singles);
+        }
+    }
+
+    /// Sums over the pairs of the owned particles.
+    pub fn sweep<K: Kernel, T: Element>(&self, pairs: Pairs, sums: &mut impl Sums<D, T>) {
+        let sweep = Sweep { movers: T::movers(self), lists: &self.of_owned, first: 0 };
+        sweep.run::<K>(pairs.h / T::unit(pairs.h), pairs.instructions, sums);
+    }
+
+    /// Lists of all pairs closer than `reach`.
+    pub fn build<const N: usize>(&mut self, particles: &Particles<D, N>, reach: f64, pairs: Pairs) {
+        let instructions = pairs.instructions;
+        let block = instructions.block(match pairs.precision {
+            Precision::Double => size_of::<f64>(),
+            Precision::Mixed => size_of::<f32>(),
+        });
         // Number the particles in ascending key. Cells hold these numbers, so that a list is sorted as plain integers.
         let mut by_key: Vec<u32> = (0..particles.len() as u32).collect();
         by_key.sort_unstable_by_key(|&i| particles.key[i as usize]);
@@ -74,6 +98,16 @@ impl Neighbors {
         let lists = &mut self.of_wall;
         instructions.run(Build { lists, cells: &cells, x: &x[particles.mirror..], by_key, reach, block });
     }
+}
+
+fn movers<const D: usize, const N: usize, T: Element>(
+    first: usize,
+    p: &Particles<D, N>,
+    unit: f64,
+    movers: &mut Vec<Mover<D, T>>,
+) {
+    movers.truncate(first);
+    movers.extend((first..p.len()).map(|i| Mover::new(p.x[i], p.v[i], p.volume[i], unit)));
 }
 
 /// Lists for blocks of the particles at `x`.

@@ -83,7 +83,7 @@ pub struct Simulation<'a, const D: usize, const N: usize, P: Physics<D, N>> {
     pub gravity: Vector<D>,
     pub clock: Clock,
     pub particles: Particles<D, N>,
-    pub neighbors: Neighbors,
+    pub neighbors: Neighbors<D>,
     pub partition: Partition<D>,
     pub periods: Periods<D>,
     pub mirrors: Mirrors<D, N>,
@@ -135,7 +135,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
                 damping: numerics.damping,
                 gate: numerics.density_gate * scene.material.density(),
                 skin: SKIN * h,
-                pairs: Pairs { h, spacing: dx, instructions: Instructions::best() },
+                pairs: Pairs { h, spacing: dx, instructions: Instructions::best(), precision: numerics.precision },
                 viscosity,
                 stabilisers: Stabilisers::new(scene),
                 count,
@@ -198,13 +198,18 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         self.mirrors.create(&mut self.particles, reach_of);
         self.mirrors.fill(&mut self.particles, Fields::Motion);
         self.walls.create::<D, N, P::Space>(&mut self.particles, reach);
-        let instructions = self.parameters.pairs.instructions;
-        self.neighbors.build(&self.particles, reach, instructions.block(size_of::<f64>()), instructions);
-        self.walls.fill_motion::<D, N, P::Space, P::Kernel>(
-            &mut self.particles,
-            &self.neighbors,
-            self.parameters.pairs,
-        );
+        self.neighbors.build(&self.particles, reach, self.parameters.pairs);
+        self.reflect_motion();
+    }
+
+    /// Velocities of wall particles, from the material around them; then sweeps can begin.
+    fn reflect_motion(&mut self) {
+        let (p, pairs) = (&mut self.particles, self.parameters.pairs);
+        self.neighbors.refresh(p, pairs);
+        if self.walls.has_sites() {
+            self.walls.fill_motion::<D, N, P::Space, P::Kernel>(p, &self.neighbors, pairs);
+            self.neighbors.refresh_from(p.mirror, p, pairs);
+        }
     }
 
     /// Brings everything around the owned particles up to date, in the one order that is right: halo, then images of
@@ -214,9 +219,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         self.partition.halo.fill(self.comm, p, fields);
         self.mirrors.fill(p, fields);
         match fields {
-            Fields::Motion => {
-                self.walls.fill_motion::<D, N, P::Space, P::Kernel>(p, &self.neighbors, self.parameters.pairs);
-            }
+            Fields::Motion => self.reflect_motion(),
             Fields::Stress => {
                 self.walls.fill_stress::<D, N, P::Space, P::Kernel>(p, &self.neighbors, self.parameters.pairs);
             }

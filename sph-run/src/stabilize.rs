@@ -8,6 +8,7 @@ use crate::boundary::wall::extend;
 use crate::material::Material as _;
 use crate::physics::Physics;
 use crate::rates::correction::{Among, correction};
+use crate::rates::momentum::Stressed;
 use crate::rates::{artificial_stress, diffusion, shifting, viscosity};
 use crate::simulation::Simulation;
 use formats::scene::Scene;
@@ -48,10 +49,9 @@ impl Stabilisers {
 /// Fields that live within a step; kept between steps for their memory only.
 #[derive(Clone, Debug, Default)]
 pub struct Buffers<const D: usize, const N: usize> {
-    /// w sigma of all particles.
-    pub weighted: Vec<Sym<N>>,
-    /// w sigma L of all particles, with corrected gradients.
-    pub corrected: Vec<Matrix<D>>,
+    /// w sigma of all particles, or w sigma L with corrected gradients; in f64 or f32.
+    pub weighted: (Vec<Stressed<Sym<N>, f64>>, Vec<Stressed<Sym<N, f32>, f32>>),
+    pub corrected: (Vec<Stressed<Matrix<D>, f64>>, Vec<Stressed<Matrix<D, f32>, f32>>),
     /// L of all particles, with corrected gradients; the unit tensor behind walls.
     pub correction: Vec<Matrix<D>>,
     /// L among the material alone, of owned particles.
@@ -159,6 +159,13 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
     /// Adds what the law and the scene ask for to the accelerations and the heat of stress and artificial viscosity.
     pub fn accelerate_further(&mut self, acceleration: &mut [Vector<D>]) {
+        let stabilisers = &self.parameters.stabilisers;
+        if self.material.pair_viscosity().is_none() && stabilisers.impact == 0.0 && stabilisers.artificial_stress == 0.0
+        {
+            return;
+        }
+        // Volumes have changed with the densities.
+        self.neighbors.refresh(&self.particles, self.parameters.pairs);
         let (p, neighbors, pairs) = (&self.particles, &self.neighbors, self.parameters.pairs);
         let Stabilisers { artificial_stress: epsilon, impact, .. } = self.parameters.stabilisers;
         let Buffers { heat, opposing, .. } = &mut self.buffers;

@@ -2,16 +2,19 @@
 //! so that stress and position are known at whole steps, velocity at halves: the staggered scheme of Yang et al. 2020,
 //! Eqs 33-39, without the lag of forces their text leaves open.
 
-use crate::algebra::{Matrix, Sym, Vector};
+use crate::algebra::Vector;
+use crate::lanes::{Element, Parts};
 use crate::material::{Increment, Material, gated};
 use crate::parallel::halo::Fields;
 use crate::physics::Physics;
 use crate::rates::{
-    momentum::{Traction, momentum},
+    momentum::{Stressed, Traction, momentum},
     velocity_gradient::velocity_gradient,
 };
 use crate::simulation::Simulation;
 use crate::space::Space;
+use crate::stabilize::Buffers;
+use crate::sweep::Precision;
 use crate::timestep::Plan;
 
 impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
@@ -72,12 +75,11 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Density and stress of the owned particles, from the velocity gradient.
     fn update_stress(&mut self, dt: f64) {
         let (spacing, gate) = (self.parameters.spacing, self.parameters.gate);
-        velocity_gradient::<D, N, P::Kernel>(
-            &self.particles,
-            &self.neighbors,
-            self.parameters.pairs,
-            &mut self.gradient,
-        );
+        let pairs = self.parameters.pairs;
+        match pairs.precision {
+            Precision::Double => velocity_gradient::<D, P::Kernel, f64>(&self.neighbors, pairs, &mut self.gradient),
+            Precision::Mixed => velocity_gradient::<D, P::Kernel, f32>(&self.neighbors, pairs, &mut self.gradient),
+        }
         self.correct_gradient();
         let p = &mut self.particles;
         let viscous = self.material.pair_viscosity().is_some();
@@ -112,22 +114,18 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     fn accelerate(&mut self) {
         let spacing = self.parameters.spacing;
         let mut a = std::mem::take(&mut self.particles.a);
-        let (p, buffers) = (&self.particles, &mut self.buffers);
-        let weigh = |(&s, &x): (&Sym<N>, &Vector<D>)| s * P::Space::metric(x, spacing);
-        buffers.weighted.clear();
-        buffers.weighted.extend(p.stress.iter().zip(&p.x).map(weigh));
-        if self.parameters.stabilisers.gradient_correction {
-            let correct = |(s, l): (&Sym<N>, &Matrix<D>)| P::Space::matrix(s).product(l);
-            buffers.corrected.clear();
-            buffers.corrected.extend(buffers.weighted.iter().zip(&buffers.correction).map(correct));
-            let corrected = std::mem::take(&mut buffers.corrected);
-            self.accelerate_by(&corrected, &mut a);
-            self.buffers.corrected = corrected;
-        } else {
-            let weighted = std::mem::take(&mut buffers.weighted);
-            self.accelerate_by(&weighted, &mut a);
-            self.buffers.weighted = weighted;
+        let mut buffers = std::mem::take(&mut self.buffers);
+        let Buffers { weighted, corrected, correction, heat, .. } = &mut buffers;
+        let p = &self.particles;
+        let weigh = |i: usize| p.stress[i] * P::Space::metric(p.x[i], spacing);
+        let correct = |i: usize| P::Space::matrix(&weigh(i)).product(&correction[i]);
+        match (self.parameters.stabilisers.gradient_correction, self.parameters.pairs.precision) {
+            (false, Precision::Double) => self.accelerate_by(weigh, &mut weighted.0, &mut a, heat),
+            (false, Precision::Mixed) => self.accelerate_by(weigh, &mut weighted.1, &mut a, heat),
+            (true, Precision::Double) => self.accelerate_by(correct, &mut corrected.0, &mut a, heat),
+            (true, Precision::Mixed) => self.accelerate_by(correct, &mut corrected.1, &mut a, heat),
         }
+        self.buffers = buffers;
         self.accelerate_further(&mut a);
         let p = &mut self.particles;
         for (i, a) in a.iter_mut().enumerate() {
@@ -136,11 +134,18 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         p.a = a;
     }
 
-    fn accelerate_by<F: Traction<D, N, f64>>(&mut self, weighted: &[F], a: &mut [Vector<D>]) {
-        let (p, heat, parameters) = (&self.particles, &mut self.buffers.heat, &self.parameters);
-        heat.resize(p.owned, 0.0);
+    fn accelerate_by<F: Traction<D, N, T>, T: Element, G: Parts<Number = f64>>(
+        &self,
+        weighted: impl Fn(usize) -> G,
+        stressed: &mut Vec<Stressed<F, T>>,
+        a: &mut [Vector<D>],
+        heat: &mut Vec<f64>,
+    ) {
+        let (p, parameters) = (&self.particles, &self.parameters);
         let (pairs, viscosity) = (parameters.pairs, parameters.viscosity);
-        momentum::<D, N, P::Space, P::Kernel, F>(p, &self.neighbors, pairs, viscosity, weighted, a, heat);
+        Stressed::all::<D, N, P::Space, G>(p, pairs.spacing, T::unit(pairs.h), weighted, stressed);
+        heat.resize(p.owned, 0.0);
+        momentum::<D, N, P::Space, P::Kernel, F, T>(p, &self.neighbors, pairs, viscosity, stressed, a, heat);
     }
 
     /// Counts the heat of the viscosity.

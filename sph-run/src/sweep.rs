@@ -5,9 +5,10 @@
 //! blocks nor on lists, ranks or restarts. What is summed is in [`crate::rates`].
 
 use crate::algebra::Vector;
-use crate::lanes::{Element, Instructions, Lanes, Parts};
-use crate::neighbors::{Lists, Neighbors};
+use crate::lanes::{Element, Instructions, Lanes, Parts, Place, prefetch};
+use crate::neighbors::Lists;
 use crate::physics::Kernel;
+pub use formats::scene::Precision;
 use pulp::{Simd, WithSimd};
 use std::marker::PhantomData;
 
@@ -20,6 +21,8 @@ pub struct Pairs {
     pub spacing: f64,
     /// What computes the pairs.
     pub instructions: Instructions,
+    /// In which numbers.
+    pub precision: Precision,
 }
 
 /// Pairs closer than this, over h, count as that far apart where the distance divides.
@@ -85,16 +88,21 @@ impl<L: Lanes> Scales<L> {
     }
 }
 
-/// A place, from which a difference can be taken.
-pub trait Place<const D: usize, T: Element>: Parts<Number = T> {
-    /// x_i - x_j
-    fn difference<L: Lanes<Element = T>>(own: Self::With<L>, other: Self::With<L>) -> Vector<D, L>;
+/// What sweeps need of a particle, side by side in memory.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub struct Mover<const D: usize, T: Element> {
+    place: T::Place<D>,
+    /// Velocity, m/s.
+    pub v: Vector<D, T>,
+    /// Volume.
+    pub volume: T,
 }
 
-impl<const D: usize> Place<D, f64> for Vector<D> {
-    #[inline(always)]
-    fn difference<L: Lanes<Element = f64>>(own: Vector<D, L>, other: Vector<D, L>) -> Vector<D, L> {
-        own - other
+impl<const D: usize, T: Element> Mover<D, T> {
+    /// Of a place, a velocity and a volume; places over a unit of length, volumes over its power.
+    pub fn new(x: Vector<D>, v: Vector<D>, volume: f64, unit: f64) -> Self {
+        Self { place: T::place(x, unit), v: Vector(v.0.map(T::of)), volume: T::of(volume / unit.powi(D as i32)) }
     }
 }
 
@@ -104,7 +112,7 @@ pub trait Sums<const D: usize, T: Element> {
     const NEEDS: Needs;
     /// Sums over all pairs of a block, in ascending key of the other particle, and keeps what comes out. Pairs outside the
     /// support in a lane have slope and value 0 there.
-    fn block<L: Lanes<Element = T>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>);
+    fn block<'a, L: Lanes<Element = T>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>);
 }
 
 /// What is computed of a pair beside its difference.
@@ -132,9 +140,11 @@ pub struct Block<L: Lanes> {
 
 /// The particles of a block and another one.
 #[derive(Clone, Copy, Debug)]
-pub struct Pair<const D: usize, L> {
+pub struct Pair<'a, const D: usize, L: Lanes> {
     /// Index of the other.
     pub j: usize,
+    /// The other.
+    pub other: &'a Mover<D, L::Element>,
     /// x_i - x_j.
     pub d: Vector<D, L>,
     /// grad_i W = slope d.
@@ -179,13 +189,25 @@ impl<L: Lanes> Block<L> {
     /// A field's values of the particles of the block.
     #[inline(always)]
     pub fn own<F: Parts<Number = L::Element>>(&self, field: &[F]) -> F::With<L> {
-        own(self.token, field, self.first, self.last)
+        self.own_of(field, |value| value)
+    }
+
+    /// As [`Block::own`], of a part of each value of the field.
+    #[inline(always)]
+    pub fn own_of<R, F: Parts<Number = L::Element>>(&self, field: &[R], of: impl Fn(&R) -> &F) -> F::With<L> {
+        F::With::<L>::from_parts(|k| self.lanes(|lane| of(&field[(self.first + lane).min(self.last)]).part(k)))
+    }
+
+    /// A number of each value of a field, of the particles of the block.
+    #[inline(always)]
+    pub fn own_number_of<R>(&self, field: &[R], of: impl Fn(&R) -> L::Element) -> L {
+        self.lanes(|lane| of(&field[(self.first + lane).min(self.last)]))
     }
 
     /// A field's numbers of the particles of the block.
     #[inline(always)]
     pub fn own_numbers(&self, field: &[L::Element]) -> L {
-        self.lanes(|lane| field[(self.first + lane).min(self.last)])
+        self.own_number_of(field, |&number| number)
     }
 
     /// Does it hold for a particle of the block?
@@ -212,21 +234,26 @@ impl<L: Lanes> Block<L> {
 /// Pairs of a block that are found, weighed and summed together. Each of the three loops has a short chain of operations
 /// for a pair; one loop would have a long one, of which a processor overlaps too few. What is found of more candidates would
 /// push the particles out of the nearest cache.
-const TOGETHER: usize = 64;
+const TOGETHER: usize = 32;
+
+/// Candidates from the one at hand to the one that is fetched.
+const AHEAD: usize = 24;
 
 /// What is near a block, some candidates at a time.
-struct Near<'a, const D: usize, L: Lanes, X: Place<D, L::Element>, K> {
+struct Near<'a, 'f, const D: usize, L: Lanes, K> {
     token: L::Token,
-    x: X::With<L>,
-    places: &'a [X],
+    place: LanesOfPlaces<D, L>,
+    movers: &'a [Mover<D, L::Element>],
     candidates: std::slice::Iter<'a, u32>,
-    scales: &'a Scales<L>,
+    scales: &'f Scales<L>,
     needs: Needs,
     kernel: PhantomData<K>,
     next: usize,
     count: usize,
-    found: &'a mut Found<L>,
+    found: &'f mut Found<L>,
 }
+
+type LanesOfPlaces<const D: usize, L> = <<<L as Lanes>::Element as Element>::Place<D> as Parts>::With<L>;
 
 /// Found, and not yet summed.
 struct Found<L> {
@@ -251,14 +278,17 @@ impl<L: Lanes> Found<L> {
     }
 }
 
-impl<const D: usize, L: Lanes, X: Place<D, L::Element>, K: Kernel> Near<'_, D, L, X, K> {
+impl<'a, const D: usize, L: Lanes, K: Kernel> Near<'a, '_, D, L, K> {
     /// The next candidates within the support of any particle of the block.
     #[inline(always)]
     fn find(&mut self) {
         let mut count = 0;
         while count < TOGETHER {
             let Some(&j) = self.candidates.next() else { break };
-            let r2 = self.difference(j).norm2();
+            if let Some(&ahead) = self.candidates.as_slice().get(AHEAD) {
+                prefetch(&self.movers[ahead as usize]);
+            }
+            let r2 = self.difference(&self.movers[j as usize]).norm2();
             // What is too far is written over by the next one: no branch.
             (self.found.j[count], self.found.r2[count]) = (j, Line(r2));
             count += usize::from(r2.any_below(self.scales.support2));
@@ -293,13 +323,13 @@ impl<const D: usize, L: Lanes, X: Place<D, L::Element>, K: Kernel> Near<'_, D, L
     }
 
     #[inline(always)]
-    fn difference(&self, j: u32) -> Vector<D, L> {
-        X::difference::<L>(self.x, all(self.token, &self.places[j as usize]))
+    fn difference(&self, other: &Mover<D, L::Element>) -> Vector<D, L> {
+        <L::Element as Element>::Place::<D>::difference::<L>(self.place, all(self.token, &other.place))
     }
 }
 
-impl<const D: usize, L: Lanes, X: Place<D, L::Element>, K: Kernel> Iterator for Near<'_, D, L, X, K> {
-    type Item = Pair<D, L>;
+impl<'a, const D: usize, L: Lanes, K: Kernel> Iterator for Near<'a, '_, D, L, K> {
+    type Item = Pair<'a, D, L>;
 
     #[inline(always)]
     fn next(&mut self) -> Option<Self::Item> {
@@ -314,8 +344,10 @@ impl<const D: usize, L: Lanes, X: Place<D, L::Element>, K: Kernel> Iterator for 
         let n = self.next % TOGETHER;
         self.next += 1;
         let Found { j, inverse, slope, value, .. } = &*self.found;
-        let j = j[n];
-        Some(Pair { j: j as usize, d: self.difference(j), inverse: inverse[n].0, slope: slope[n].0, value: value[n].0 })
+        let j = j[n] as usize;
+        let other = &self.movers[j];
+        let d = self.difference(other);
+        Some(Pair { j, other, d, inverse: inverse[n].0, slope: slope[n].0, value: value[n].0 })
     }
 }
 
@@ -324,70 +356,57 @@ fn all<F: Parts<Number = L::Element>, L: Lanes>(token: L::Token, value: &F) -> F
     F::With::<L>::from_parts(|k| L::all(token, value.part(k)))
 }
 
-#[inline(always)]
-fn own<F: Parts<Number = L::Element>, L: Lanes>(token: L::Token, field: &[F], first: usize, last: usize) -> F::With<L> {
-    F::With::<L>::from_parts(|k| L::each(token, |lane| field[(first + lane).min(last)].part(k)))
-}
-
 /// Which particles to sum for, over which others.
 #[derive(Clone, Copy, Debug)]
-pub struct Sweep<'a, X> {
-    /// Places of all particles.
-    pub places: &'a [X],
+pub struct Sweep<'a, const D: usize, T: Element> {
+    /// All particles.
+    pub movers: &'a [Mover<D, T>],
     /// Candidates of the blocks.
     pub lists: &'a Lists,
     /// Index of the first particle of the first block.
     pub first: usize,
 }
 
-impl<'a, X> Sweep<'a, X> {
-    /// For the owned particles.
-    pub fn owned(places: &'a [X], neighbors: &'a Neighbors) -> Self {
-        Self { places, lists: &neighbors.of_owned, first: 0 }
-    }
-
-    /// Calls [`Sums::block`] for every block.
-    pub fn run<const D: usize, T: Element, K: Kernel>(self, pairs: Pairs, sums: &mut impl Sums<D, T>)
-    where
-        X: Place<D, T>,
-    {
-        let scales = Scales::new::<D, K>(pairs.h);
-        pairs.instructions.run(Run::<'_, D, T, X, K, _> { sweep: self, scales, sums, kernel: PhantomData });
+impl<const D: usize, T: Element> Sweep<'_, D, T> {
+    /// Calls [`Sums::block`] for every block. `h`: smoothing length in the movers' unit.
+    pub fn run<K: Kernel>(self, h: f64, instructions: Instructions, sums: &mut impl Sums<D, T>) {
+        let scales = Scales::new::<D, K>(h);
+        instructions.run(Run::<'_, D, T, K, _> { sweep: self, scales, sums, kernel: PhantomData });
     }
 }
 
-struct Run<'a, const D: usize, T, X, K, Q> {
-    sweep: Sweep<'a, X>,
+struct Run<'a, const D: usize, T: Element, K, Q> {
+    sweep: Sweep<'a, D, T>,
     scales: Scales<T>,
     sums: &'a mut Q,
     kernel: PhantomData<K>,
 }
 
-impl<const D: usize, T: Element, X: Place<D, T>, K: Kernel, Q: Sums<D, T>> WithSimd for Run<'_, D, T, X, K, Q> {
+impl<const D: usize, T: Element, K: Kernel, Q: Sums<D, T>> WithSimd for Run<'_, D, T, K, Q> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, token: S) {
-        let Sweep { places, lists, first: start } = self.sweep;
-        let scales = self.scales.lanes::<T::Lanes<S>>(token);
+        let Sweep { movers, lists, first: start } = self.sweep;
+        let scales = &self.scales.lanes::<T::Lanes<S>>(token);
         let found = &mut Found::new(scales.zero);
         for (block, candidates) in lists.blocks() {
             let end = start + block.end;
             for first in (start + block.start..end).step_by(T::Lanes::<S>::LANES) {
-                let last = end - 1;
-                let near = Near::<'_, D, T::Lanes<S>, X, K> {
+                let block = Block::<T::Lanes<S>> { token, first, last: end - 1 };
+                let near = Near::<'_, '_, D, T::Lanes<S>, K> {
                     token,
-                    x: own(token, places, first, last),
-                    places,
+                    place: block.own_of(movers, |mover| &mover.place),
+                    movers,
                     candidates: candidates.iter(),
-                    scales: &scales,
+                    scales,
                     needs: Q::NEEDS,
                     kernel: PhantomData,
                     next: 0,
                     count: 0,
                     found,
                 };
-                self.sums.block(Block { token, first, last }, near);
+                self.sums.block(block, near);
             }
         }
     }

@@ -359,6 +359,18 @@ pub struct Numerics {
     pub gradient_correction: bool,
     /// Shifting of particles inside the body; 0 switches it off.
     pub shifting: f64,
+    /// Numbers that sums over pairs are made of.
+    pub precision: Precision,
+}
+
+/// Numbers that the sums over pairs of stress and velocity are made of. All else is f64.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// f64.
+    #[default]
+    Double,
+    /// f32, from differences of places that are as good as f32 can hold.
+    Mixed,
 }
 
 /// When the run is over.

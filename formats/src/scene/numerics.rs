@@ -1,7 +1,7 @@
 //! `[numerics]` of a scene: time step, viscosity, and the stabilisers, each of them off unless the law or the scene asks.
 
 use super::{
-    Material, Numerics,
+    Material, Numerics, Precision,
     raw::{Allowed, Found, NOT_NEGATIVE, Table},
 };
 use crate::{kernel::Kernel, space::Space, units::Dimension};
@@ -39,6 +39,8 @@ pub(super) fn read(root: &Table<'_>, place: Place, material: Option<&Material>) 
     let corrections = [("none", false), ("variational", true)];
     let gradient_correction = table.choice("gradient-correction", &corrections);
     let shifting = table.number("shifting", Dimension::Number, &UNIT);
+
+    let precision = table.choice("precision", &[("f64", Precision::Double), ("mixed", Precision::Mixed)]);
 
     let corrected = gradient_correction.as_ref().is_some_and(|found| found.value);
     let (limit, reason) = if place.space == Some(Space::Axisymmetric) {
@@ -101,6 +103,7 @@ pub(super) fn read(root: &Table<'_>, place: Place, material: Option<&Material>) 
         artificial_stress: or(artificial_stress, 0.0),
         gradient_correction: corrected,
         shifting: or(shifting, 0.0),
+        precision: precision.map_or(Precision::Double, |found| found.value),
     })
 }
 

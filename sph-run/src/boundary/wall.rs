@@ -76,7 +76,7 @@ impl Walls {
     pub fn fill_motion<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
         &self,
         p: &mut Particles<D, N>,
-        neighbors: &Neighbors,
+        neighbors: &Neighbors<D>,
         pairs: Pairs,
     ) {
         let mut velocities = Vec::new();
@@ -94,7 +94,7 @@ impl Walls {
     pub fn fill_stress<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
         &self,
         p: &mut Particles<D, N>,
-        neighbors: &Neighbors,
+        neighbors: &Neighbors<D>,
         pairs: Pairs,
     ) {
         let mut stresses = Vec::new();
@@ -108,7 +108,7 @@ impl Walls {
 /// Extrapolates a field that does not change across a wall.
 pub fn extend<const D: usize, const N: usize, K: Kernel, F: Parts<Number = f64> + Default>(
     p: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     field: &mut [F],
 ) {

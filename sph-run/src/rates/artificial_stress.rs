@@ -7,7 +7,7 @@ use crate::particles::Particles;
 use crate::physics::Kernel;
 use crate::rates::momentum::Traction;
 use crate::space::Space;
-use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
+use crate::sweep::{Block, Needs, Pair, Pairs, Sums};
 use std::marker::PhantomData;
 
 /// The stress that holds particles apart: -epsilon w times the tensile principal stresses, of every particle.
@@ -28,7 +28,7 @@ pub fn opposing<const D: usize, const N: usize, S: Space<D, N>>(
 /// and n = W(0)/W(dx), 2.55 for the cubic spline at h = 1.2 dx. `opposing`: R, see [`opposing`].
 pub fn artificial_stress<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
     particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     opposing: &[Sym<N>],
     acceleration: &mut [Vector<D>],
@@ -37,16 +37,15 @@ pub fn artificial_stress<const D: usize, const N: usize, S: Space<D, N>, K: Kern
     let shape = |r: f64| K::KIND.shape(r / pairs.h);
     let near = K::KIND.norm(D) / pairs.h.powi(D as i32) * shape(pairs.spacing);
     let exponent = shape(0.0) / shape(pairs.spacing);
-    let sums = Repulsion { volume: &particles.volume, opposing, near, exponent, force: &mut force, space: PhantomData };
+    let sums = Repulsion { opposing, near, exponent, force: &mut force, space: PhantomData };
     let mut sums: Repulsion<'_, D, N, S> = sums;
-    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    neighbors.sweep::<K, f64>(pairs, &mut sums);
     for (i, acceleration) in acceleration.iter_mut().enumerate() {
         *acceleration += force[i] * (1.0 / (particles.density[i] * S::metric(particles.x[i], pairs.spacing)));
     }
 }
 
 struct Repulsion<'a, const D: usize, const N: usize, S> {
-    volume: &'a [f64],
     opposing: &'a [Sym<N>],
     /// W(dx)
     near: f64,
@@ -59,7 +58,7 @@ impl<const D: usize, const N: usize, S: Space<D, N>> Sums<D, f64> for Repulsion<
     const NEEDS: Needs = Needs { value: true, ..Needs::SLOPE };
 
     #[inline(always)]
-    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+    fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
         let own = block.own(self.opposing);
         let in_tension = block.any_lane(self.opposing, |opposing| *opposing != Sym::default());
         let zero = block.number(0.0);
@@ -70,7 +69,7 @@ impl<const D: usize, const N: usize, S: Space<D, N>> Sums<D, f64> for Repulsion<
             if in_tension || *other != Sym::default() {
                 let value = pair.value;
                 let f = block.lanes(|k| (value.lane(k) / self.near).powf(self.exponent));
-                let weight = f * block.same(self.volume[pair.j]) * pair.slope;
+                let weight = f * block.same(pair.other.volume) * pair.slope;
                 sum += <Sym<N> as Traction<D, N, f64>>::on::<S, L>(own, block.all(other), zero, pair.d * weight);
             }
         }

@@ -5,7 +5,7 @@ use crate::lanes::Lanes;
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 use crate::physics::Kernel;
-use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
+use crate::sweep::{Block, Needs, Pair, Pairs, Sums};
 
 /// Largest norm sqrt(L:L) of a correction. Beyond it a particle has hardly any neighbours, or all in a row or a plane, and
 /// gets the unit tensor: it would amplify noise, and swing too fast for the time step. Inside the norm is sqrt(D), on flat
@@ -36,15 +36,15 @@ impl Among {
 /// Eq 26).
 pub fn correction<const D: usize, const N: usize, K: Kernel>(
     particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     among: Among,
     correction: &mut Vec<Matrix<D>>,
 ) {
     correction.clear();
     correction.resize(particles.owned, Matrix::default());
-    let mut sums = Moments { volume: &particles.volume, end: among.end(particles), moments: correction };
-    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    let mut sums = Moments { end: among.end(particles), moments: correction };
+    neighbors.sweep::<K, f64>(pairs, &mut sums);
     for moment in correction {
         let inverse = moment.inverse(moment.determinant());
         // Not a number where the determinant is 0: no comparison holds.
@@ -55,7 +55,6 @@ pub fn correction<const D: usize, const N: usize, K: Kernel>(
 
 /// sum_j V_j x_ji (x) grad_i W_ij
 struct Moments<'a, const D: usize> {
-    volume: &'a [f64],
     end: usize,
     moments: &'a mut [Matrix<D>],
 }
@@ -64,10 +63,10 @@ impl<const D: usize> Sums<D, f64> for Moments<'_, D> {
     const NEEDS: Needs = Needs::SLOPE;
 
     #[inline(always)]
-    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+    fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
         let mut sum: Matrix<D, L> = block.zero();
         for pair in pairs.filter(|pair| pair.j < self.end) {
-            let weight = block.same(-self.volume[pair.j]) * pair.slope;
+            let weight = block.same(-pair.other.volume) * pair.slope;
             sum.add_outer(pair.d * weight, pair.d);
         }
         block.put(self.moments, sum);

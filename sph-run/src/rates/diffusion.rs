@@ -5,7 +5,7 @@ use crate::lanes::{Lanes, Parts};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 use crate::physics::Kernel;
-use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
+use crate::sweep::{Block, Needs, Pair, Pairs, Sums};
 
 /// What can diffuse: density, stress.
 pub trait Diffusing: Parts<Number = f64> + Default {}
@@ -15,7 +15,7 @@ impl<F: Parts<Number = f64> + Default> Diffusing for F {}
 /// material (Yang et al. 2020, Eq 25).
 pub fn gradient<const D: usize, const N: usize, K: Kernel, F: Diffusing>(
     particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     correction: &[Matrix<D>],
     field: &[F],
@@ -23,8 +23,8 @@ pub fn gradient<const D: usize, const N: usize, K: Kernel, F: Diffusing>(
 ) {
     gradient.clear();
     gradient.resize(particles.owned, [F::default(); D]);
-    let mut sums = Gradient { volume: &particles.volume, end: particles.mirror, field, gradient };
-    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    let mut sums = Gradient { end: particles.mirror, field, gradient };
+    neighbors.sweep::<K, f64>(pairs, &mut sums);
     for (gradient, Matrix(l)) in gradient.iter_mut().zip(correction) {
         let plain = *gradient;
         *gradient =
@@ -33,7 +33,6 @@ pub fn gradient<const D: usize, const N: usize, K: Kernel, F: Diffusing>(
 }
 
 struct Gradient<'a, const D: usize, F> {
-    volume: &'a [f64],
     end: usize,
     field: &'a [F],
     gradient: &'a mut [[F; D]],
@@ -43,11 +42,11 @@ impl<const D: usize, F: Diffusing> Sums<D, f64> for Gradient<'_, D, F> {
     const NEEDS: Needs = Needs::SLOPE;
 
     #[inline(always)]
-    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+    fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
         let own = block.own(self.field);
         let mut sum: [F::With<L>; D] = block.zero();
         for pair in pairs.filter(|pair| pair.j < self.end) {
-            let weight = block.same(self.volume[pair.j]) * pair.slope;
+            let weight = block.same(pair.other.volume) * pair.slope;
             let other = block.all(&self.field[pair.j]);
             for a in 0..D {
                 let way = pair.d.0[a] * weight;
@@ -70,7 +69,7 @@ impl<const D: usize, F: Diffusing> Sums<D, f64> for Gradient<'_, D, F> {
 /// axisymmetric space.
 pub fn diffusion<const D: usize, const N: usize, K: Kernel, F: Diffusing>(
     particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     strength: f64,
     field: &[F],
@@ -79,12 +78,11 @@ pub fn diffusion<const D: usize, const N: usize, K: Kernel, F: Diffusing>(
 ) {
     rate.clear();
     rate.resize(particles.owned, F::default());
-    let mut sums = Diffusion { volume: &particles.volume, end: particles.mirror, strength, field, gradient, rate };
-    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    let mut sums = Diffusion { end: particles.mirror, strength, field, gradient, rate };
+    neighbors.sweep::<K, f64>(pairs, &mut sums);
 }
 
 struct Diffusion<'a, const D: usize, F> {
-    volume: &'a [f64],
     end: usize,
     strength: f64,
     field: &'a [F],
@@ -96,13 +94,13 @@ impl<const D: usize, F: Diffusing> Sums<D, f64> for Diffusion<'_, D, F> {
     const NEEDS: Needs = Needs::SLOPE;
 
     #[inline(always)]
-    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+    fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
         let (own, slope) = (block.own(self.field), block.own(self.gradient));
         let two = block.number(2.0);
         let mut sum: F::With<L> = block.zero();
         for pair in pairs.filter(|pair| pair.j < self.end) {
             // x_ji . grad W/r^2 = -slope.
-            let weight = block.same(-self.volume[pair.j]) * pair.slope;
+            let weight = block.same(-pair.other.volume) * pair.slope;
             let (other, slope_there) = (block.all(&self.field[pair.j]), block.all(&self.gradient[pair.j]));
             sum = Parts::from_parts(|k| {
                 let mut psi = (other.part(k) - own.part(k)) * two;

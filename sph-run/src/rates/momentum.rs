@@ -6,7 +6,7 @@ use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 use crate::physics::Kernel;
 use crate::space::Space;
-use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
+use crate::sweep::{Block, Mover, Needs, Pair, Pairs, Sums};
 use std::marker::PhantomData;
 
 /// A stress, alone or times the correction of the gradient.
@@ -61,51 +61,75 @@ pub struct Viscosity {
     pub below: f64,
 }
 
+/// What the acceleration needs of a particle beside its place and velocity, side by side in memory.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub struct Stressed<F, T> {
+    /// w sigma, or w sigma L.
+    weighted: F,
+    volume: T,
+    /// |w|/2: image rings have negative radii, and the mean distance from the axis weighs the viscosity.
+    radius: T,
+}
+
+impl<F: Parts> Stressed<F, F::Number> {
+    /// All particles, with `weighted(i)` = w sigma or w sigma L of each.
+    pub fn all<const D: usize, const N: usize, S: Space<D, N>, G: Parts<Number = f64>>(
+        particles: &Particles<D, N>,
+        spacing: f64,
+        unit: f64,
+        weighted: impl Fn(usize) -> G,
+        stressed: &mut Vec<Self>,
+    ) where
+        F::Number: Element,
+    {
+        let of = F::Number::of;
+        let per_volume = 1.0 / unit.powi(D as i32);
+        stressed.clear();
+        stressed.extend((0..particles.len()).map(|i| {
+            let weighted = weighted(i);
+            Self {
+                weighted: F::from_parts(|k| of(weighted.part(k))),
+                volume: of(particles.volume[i] * per_volume),
+                radius: of(half_radius::<D, N, S>(particles.x[i], spacing)),
+            }
+        }));
+    }
+}
+
+/// |w|/2
+pub(super) fn half_radius<const D: usize, const N: usize, S: Space<D, N>>(x: Vector<D>, spacing: f64) -> f64 {
+    0.5 * S::metric(x, spacing).abs()
+}
+
 /// Acceleration of every owned particle, m/s2; gravity is added by the caller. `heat`: power the viscosity turns into
 /// heat, W/kg, half of each pair's.
 ///
-/// `weighted` is w sigma, or w sigma L, of every particle. The viscosity is pi = min(v_ij . x_ij, below)/r^2: of the printed
-/// Eq 22 the sign that takes energy out.
-pub fn momentum<const D: usize, const N: usize, S: Space<D, N>, K: Kernel, F: Traction<D, N, f64>>(
+/// The viscosity is pi = min(v_ij . x_ij, below)/r^2: of the printed Eq 22 the sign that takes energy out.
+pub fn momentum<const D: usize, const N: usize, S: Space<D, N>, K: Kernel, F: Traction<D, N, T>, T: Element>(
     particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     viscosity: Viscosity,
-    weighted: &[F],
+    stressed: &[Stressed<F, T>],
     acceleration: &mut [Vector<D>],
     heat: &mut [f64],
 ) {
-    let Particles { x, v, volume, .. } = particles;
-    let radius = if S::WEIGHTED { half_radii::<D, N, S>(x, pairs.spacing) } else { Vec::new() };
-    let mut sums = Momentum {
-        v,
-        volume,
-        weighted,
-        radius: &radius,
-        viscosity,
-        acceleration,
-        heat,
-        space: PhantomData::<(S, [(); N])>,
-    };
-    Sweep::owned(x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    let (movers, unit) = (T::movers(neighbors), T::unit(pairs.h));
+    let viscosity = Viscosity { strength: viscosity.strength / unit, ..viscosity };
+    let space = PhantomData::<(S, [(); N])>;
+    let sums = &mut Momentum { movers, stressed, viscosity, acceleration, heat, space };
+    neighbors.sweep::<K, T>(pairs, sums);
     for (i, (acceleration, heat)) in acceleration.iter_mut().zip(heat).enumerate() {
-        let per_mass = 1.0 / (particles.density[i] * S::metric(x[i], pairs.spacing));
+        let per_mass = 1.0 / (particles.density[i] * S::metric(particles.x[i], pairs.spacing) * unit);
         *acceleration = *acceleration * per_mass;
         *heat *= -0.5 * per_mass;
     }
 }
 
-/// Half of |w| of every particle: image rings have negative radii, and the mean distance from the axis
-/// weighs the viscosity.
-pub(super) fn half_radii<const D: usize, const N: usize, S: Space<D, N>>(x: &[Vector<D>], spacing: f64) -> Vec<f64> {
-    x.iter().map(|&x| 0.5 * S::metric(x, spacing).abs()).collect()
-}
-
-struct Momentum<'a, const D: usize, T, F, S> {
-    v: &'a [Vector<D, T>],
-    volume: &'a [T],
-    weighted: &'a [F],
-    radius: &'a [T],
+struct Momentum<'a, const D: usize, T: Element, F, S> {
+    movers: &'a [Mover<D, T>],
+    stressed: &'a [Stressed<F, T>],
     viscosity: Viscosity,
     acceleration: &'a mut [Vector<D>],
     heat: &'a mut [f64],
@@ -119,22 +143,23 @@ impl<const D: usize, const N: usize, T: Element, F: Traction<D, N, T>, S: Space<
     const NEEDS: Needs = Needs::SLOPE;
 
     #[inline(always)]
-    fn block<L: Lanes<Element = T>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
-        let (v, own) = (block.own(self.v), block.own(self.weighted));
+    fn block<'a, L: Lanes<Element = T>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
+        let v = block.own_of(self.movers, |mover| &mover.v);
+        let own = block.own_of(self.stressed, |stressed| &stressed.weighted);
+        let radius = block.own_number_of(self.stressed, |stressed| stressed.radius);
         let strength = block.number(self.viscosity.strength);
         let below = block.number(self.viscosity.below);
-        let radius = if S::WEIGHTED { block.own_numbers(self.radius) } else { block.number(0.5) };
         let mut sum: Vector<D, L> = block.zero();
         let mut power = block.number(0.0);
         for pair in pairs {
-            let j = pair.j;
-            let approach = (v - block.all(&self.v[j])).dot(pair.d).least(below);
+            let other = &self.stressed[pair.j];
+            let approach = (v - block.all(&pair.other.v)).dot(pair.d).least(below);
             let mut push = strength * approach * (pair.inverse * pair.inverse);
             if S::WEIGHTED {
-                push = push * (radius + block.same(self.radius[j]));
+                push = push * (radius + block.same(other.radius));
             }
-            let weight = block.same(self.volume[j]) * pair.slope;
-            sum += F::on::<S, L>(own, block.all(&self.weighted[j]), push, pair.d * weight);
+            let weight = block.same(other.volume) * pair.slope;
+            sum += F::on::<S, L>(own, block.all(&other.weighted), push, pair.d * weight);
             power = (push * approach).multiply_add(weight, power);
         }
         block.put(self.acceleration, sum);

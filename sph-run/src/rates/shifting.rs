@@ -5,7 +5,7 @@ use crate::lanes::Lanes;
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 use crate::physics::Kernel;
-use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
+use crate::sweep::{Block, Needs, Pair, Pairs, Sums};
 
 /// Constant A of Skillen, Lind, Stansby & Rogers (2013) where the scene asks for shifting = 1.
 const STRENGTH: f64 = 2.0;
@@ -18,14 +18,14 @@ const LARGEST: f64 = 0.05;
 /// 1 for the owned particles at a free surface, 0 for all others.
 pub fn surface<const D: usize, const N: usize, K: Kernel>(
     particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     surface: &mut Vec<f64>,
 ) {
     surface.clear();
     surface.resize(particles.owned, 0.0);
-    let mut sums = Divergence { volume: &particles.volume, divergence: surface };
-    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    let mut sums = Divergence { divergence: surface };
+    neighbors.sweep::<K, f64>(pairs, &mut sums);
     for divergence in surface {
         *divergence = if *divergence < INSIDE * D as f64 { 1.0 } else { 0.0 };
     }
@@ -33,7 +33,6 @@ pub fn surface<const D: usize, const N: usize, K: Kernel>(
 
 /// sum_j V_j x_ji . grad_i W_ij
 struct Divergence<'a> {
-    volume: &'a [f64],
     divergence: &'a mut [f64],
 }
 
@@ -41,10 +40,10 @@ impl<const D: usize> Sums<D, f64> for Divergence<'_> {
     const NEEDS: Needs = Needs::SLOPE;
 
     #[inline(always)]
-    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+    fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
         let mut sum = block.number(0.0);
         for pair in pairs {
-            let weight = block.same(-self.volume[pair.j]) * pair.slope;
+            let weight = block.same(-pair.other.volume) * pair.slope;
             sum = pair.d.norm2().multiply_add(weight, sum);
         }
         block.put(self.divergence, sum);
@@ -67,7 +66,7 @@ pub struct Shifting<'a> {
 /// the gradient points into the body whatever the arrangement, and would press layers against the outermost one.
 pub fn shift<const D: usize, const N: usize, K: Kernel>(
     particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     shifting: Shifting<'_>,
     shift: &mut Vec<Vector<D>>,
@@ -76,8 +75,8 @@ pub fn shift<const D: usize, const N: usize, K: Kernel>(
     shift.clear();
     shift.resize(particles.owned, Vector::default());
     let mut open = vec![0.0; particles.owned];
-    let mut sums = Concentration { volume: &particles.volume, surface, gradient: shift, open: &mut open };
-    Sweep::owned(&particles.x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    let mut sums = Concentration { surface, gradient: shift, open: &mut open };
+    neighbors.sweep::<K, f64>(pairs, &mut sums);
     for (i, shift) in shift.iter_mut().enumerate() {
         let way = *shift * (-STRENGTH * strength * pairs.h * particles.v[i].norm() * dt);
         let scale = (LARGEST * pairs.spacing / way.norm().max(f64::MIN_POSITIVE)).min(1.0);
@@ -87,7 +86,6 @@ pub fn shift<const D: usize, const N: usize, K: Kernel>(
 
 /// grad C, and where the support reaches a free surface.
 struct Concentration<'a, const D: usize> {
-    volume: &'a [f64],
     surface: &'a [f64],
     gradient: &'a mut [Vector<D>],
     open: &'a mut [f64],
@@ -97,11 +95,11 @@ impl<const D: usize> Sums<D, f64> for Concentration<'_, D> {
     const NEEDS: Needs = Needs { value: true, ..Needs::SLOPE };
 
     #[inline(always)]
-    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+    fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
         let mut sum: Vector<D, L> = block.zero();
         let mut open = block.own_numbers(self.surface);
         for pair in pairs {
-            let weight = block.same(self.volume[pair.j]) * pair.slope;
+            let weight = block.same(pair.other.volume) * pair.slope;
             sum.add_scaled(weight, pair.d);
             // Of candidates outside the support none counts.
             open = pair.value.multiply_add(block.same(self.surface[pair.j]), open);

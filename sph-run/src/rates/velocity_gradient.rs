@@ -1,26 +1,25 @@
 //! Velocity gradient.
 
-use crate::algebra::{Matrix, Vector};
+use crate::algebra::Matrix;
 use crate::lanes::{Element, Lanes};
 use crate::neighbors::Neighbors;
-use crate::particles::Particles;
 use crate::physics::Kernel;
-use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
+use crate::sweep::{Block, Mover, Needs, Pair, Pairs, Sums};
 
 /// Velocity gradient of every owned particle, 1/s: sum_j V_j (v_j - v_i) (x) grad_i W_ij.
-pub fn velocity_gradient<const D: usize, const N: usize, K: Kernel>(
-    particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+pub fn velocity_gradient<const D: usize, K: Kernel, T: Element>(
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     gradient: &mut [Matrix<D>],
 ) {
-    let Particles { x, v, volume, .. } = particles;
-    Sweep::owned(x, neighbors).run::<D, f64, K>(pairs, &mut VelocityGradient { v, volume, gradient });
+    let movers = T::movers(neighbors);
+    let scale = 1.0 / T::unit(pairs.h);
+    neighbors.sweep::<K, T>(pairs, &mut VelocityGradient { movers, scale, gradient });
 }
 
-struct VelocityGradient<'a, const D: usize, T> {
-    v: &'a [Vector<D, T>],
-    volume: &'a [T],
+struct VelocityGradient<'a, const D: usize, T: Element> {
+    movers: &'a [Mover<D, T>],
+    scale: f64,
     gradient: &'a mut [Matrix<D>],
 }
 
@@ -28,13 +27,13 @@ impl<const D: usize, T: Element> Sums<D, T> for VelocityGradient<'_, D, T> {
     const NEEDS: Needs = Needs::SLOPE;
 
     #[inline(always)]
-    fn block<L: Lanes<Element = T>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
-        let v = block.own(self.v);
+    fn block<'a, L: Lanes<Element = T>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
+        let v = block.own_of(self.movers, |mover| &mover.v);
         let mut sum: Matrix<D, L> = block.zero();
         for pair in pairs {
-            let weight = block.same(self.volume[pair.j]) * pair.slope;
-            sum.add_outer((block.all(&self.v[pair.j]) - v) * weight, pair.d);
+            let weight = block.same(pair.other.volume) * pair.slope;
+            sum.add_outer((block.all(&pair.other.v) - v) * weight, pair.d);
         }
-        block.put(self.gradient, sum);
+        block.put(self.gradient, sum.times_number(block.number(self.scale)));
     }
 }

@@ -7,9 +7,9 @@ use crate::material::Mean;
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 use crate::physics::Kernel;
-use crate::rates::momentum::half_radii;
+use crate::rates::momentum::half_radius;
 use crate::space::Space;
-use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
+use crate::sweep::{Block, Mover, Needs, Pair, Pairs, Sums};
 
 /// Adds the acceleration by the viscosity of a fluid of variable viscosity (Szewc 2017, Eq 9, in volume form), m/s2:
 ///
@@ -21,17 +21,18 @@ use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
 /// the part of grad v^T. In the axisymmetric space pairs count by the mean of their radii, and -mu v_r/(rho r^2) is added.
 pub fn between_particles<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
     particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     mean: Mean,
     acceleration: &mut [Vector<D>],
     heat: &mut [f64],
 ) {
     let force = Force::all(particles.owned);
-    let radius = &half_radii::<D, N, S>(&particles.x, pairs.spacing);
-    let Particles { x, v, volume, viscosity, .. } = particles;
-    let mut sums = Between { v, volume, viscosity, radius, mean, eta2: 1e-4 * pairs.h * pairs.h, force };
-    Sweep::owned(x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    let radius = &radii::<D, N, S>(&particles.x, pairs.spacing);
+    let Particles { x, v, viscosity, .. } = particles;
+    let mut sums =
+        Between { movers: &neighbors.movers, viscosity, radius, mean, eta2: 1e-4 * pairs.h * pairs.h, force };
+    neighbors.sweep::<K, f64>(pairs, &mut sums);
     sums.force.add::<N, S>(particles, pairs, acceleration, heat);
     for (i, (acceleration, heat)) in acceleration.iter_mut().zip(heat).enumerate() {
         let hoop = S::strain_rate(&Matrix::default(), x[i], v[i], pairs.spacing) * viscosity[i];
@@ -39,6 +40,10 @@ pub fn between_particles<const D: usize, const N: usize, S: Space<D, N>, K: Kern
         *acceleration += hoop;
         *heat -= hoop.dot(v[i]);
     }
+}
+
+fn radii<const D: usize, const N: usize, S: Space<D, N>>(x: &[Vector<D>], spacing: f64) -> Vec<f64> {
+    x.iter().map(|&x| half_radius::<D, N, S>(x, spacing)).collect()
 }
 
 /// w sum_j .. and its power, of every owned particle.
@@ -68,8 +73,7 @@ impl<const D: usize> Force<D> {
 }
 
 struct Between<'a, const D: usize> {
-    v: &'a [Vector<D>],
-    volume: &'a [f64],
+    movers: &'a [Mover<D, f64>],
     viscosity: &'a [f64],
     radius: &'a [f64],
     mean: Mean,
@@ -81,8 +85,12 @@ impl<const D: usize> Sums<D, f64> for Between<'_, D> {
     const NEEDS: Needs = Needs::SLOPE;
 
     #[inline(always)]
-    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
-        let (v, mu, radius) = (block.own(self.v), block.own_numbers(self.viscosity), block.own_numbers(self.radius));
+    fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
+        let (v, mu, radius) = (
+            block.own_of(self.movers, |mover| &mover.v),
+            block.own_numbers(self.viscosity),
+            block.own_numbers(self.radius),
+        );
         let (eta2, smallest, four) = (block.number(self.eta2), block.number(f64::MIN_POSITIVE), block.number(4.0));
         let mut sum: Vector<D, L> = block.zero();
         let mut power = block.number(0.0);
@@ -95,8 +103,8 @@ impl<const D: usize> Sums<D, f64> for Between<'_, D> {
             };
             let r2 = pair.d.norm2();
             let distance = r2.over(r2 + eta2) * (radius + block.same(self.radius[j]));
-            let weight = block.same(self.volume[j]) * pair.slope * both * distance;
-            let difference = v - block.all(&self.v[j]);
+            let weight = block.same(pair.other.volume) * pair.slope * both * distance;
+            let difference = v - block.all(&pair.other.v);
             sum.add_scaled(weight, difference);
             power = difference.norm2().multiply_add(weight, power);
         }
@@ -110,23 +118,21 @@ impl<const D: usize> Sums<D, f64> for Between<'_, D> {
 /// beta rho0 (h v_ij . x_ij/(r^2 + 0.01 h^2))^2. `strength`: beta rho0 h^2, Pa s2.
 pub fn on_impact<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
     particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     strength: f64,
     acceleration: &mut [Vector<D>],
     heat: &mut [f64],
 ) {
     let force = Force::all(particles.owned);
-    let radius = &half_radii::<D, N, S>(&particles.x, pairs.spacing);
-    let Particles { x, v, volume, .. } = particles;
-    let mut sums = Impact { v, volume, radius, strength, eta2: 0.01 * pairs.h * pairs.h, force };
-    Sweep::owned(x, neighbors).run::<D, f64, K>(pairs, &mut sums);
+    let radius = &radii::<D, N, S>(&particles.x, pairs.spacing);
+    let mut sums = Impact { movers: &neighbors.movers, radius, strength, eta2: 0.01 * pairs.h * pairs.h, force };
+    neighbors.sweep::<K, f64>(pairs, &mut sums);
     sums.force.add::<N, S>(particles, pairs, acceleration, heat);
 }
 
 struct Impact<'a, const D: usize> {
-    v: &'a [Vector<D>],
-    volume: &'a [f64],
+    movers: &'a [Mover<D, f64>],
     radius: &'a [f64],
     strength: f64,
     eta2: f64,
@@ -137,16 +143,16 @@ impl<const D: usize> Sums<D, f64> for Impact<'_, D> {
     const NEEDS: Needs = Needs::SLOPE;
 
     #[inline(always)]
-    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
-        let (v, radius) = (block.own(self.v), block.own_numbers(self.radius));
+    fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
+        let (v, radius) = (block.own_of(self.movers, |mover| &mover.v), block.own_numbers(self.radius));
         let (eta2, strength, zero) = (block.number(self.eta2), block.number(-self.strength), block.number(0.0));
         let mut sum: Vector<D, L> = block.zero();
         let mut power = zero;
         for pair in pairs {
             let j = pair.j;
-            let approach = (v - block.all(&self.v[j])).dot(pair.d).least(zero);
+            let approach = (v - block.all(&pair.other.v)).dot(pair.d).least(zero);
             let rate = approach.over(pair.d.norm2() + eta2);
-            let weight = block.same(self.volume[j]) * pair.slope * (radius + block.same(self.radius[j]));
+            let weight = block.same(pair.other.volume) * pair.slope * (radius + block.same(self.radius[j]));
             let push = strength * rate * rate * weight;
             sum.add_scaled(push, pair.d);
             power = approach.multiply_add(push, power);

@@ -10,19 +10,19 @@ use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
 /// no material is in reach. `field` holds all particles of the material, and may hold more.
 pub fn extrapolate<const D: usize, const N: usize, K: Kernel, F: Parts<Number = f64> + Default>(
     particles: &Particles<D, N>,
-    neighbors: &Neighbors,
+    neighbors: &Neighbors<D>,
     pairs: Pairs,
     field: &[F],
     at_walls: &mut Vec<F>,
 ) {
     at_walls.clear();
     at_walls.resize(particles.len() - particles.mirror, F::default());
-    let sweep = Sweep { places: &particles.x[..], lists: &neighbors.of_wall, first: particles.mirror };
-    sweep.run::<D, f64, K>(pairs, &mut Shepard { volume: &particles.volume, field, first: particles.mirror, at_walls });
+    let first = particles.mirror;
+    let sweep = Sweep { movers: &neighbors.movers, lists: &neighbors.of_wall, first };
+    sweep.run::<K>(pairs.h, pairs.instructions, &mut Shepard { field, first, at_walls });
 }
 
 struct Shepard<'a, F> {
-    volume: &'a [f64],
     field: &'a [F],
     first: usize,
     at_walls: &'a mut [F],
@@ -32,11 +32,11 @@ impl<const D: usize, F: Parts<Number = f64>> Sums<D, f64> for Shepard<'_, F> {
     const NEEDS: Needs = Needs::VALUE;
 
     #[inline(always)]
-    fn block<L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<D, L>>) {
+    fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
         let mut weights = block.number(0.0);
         let mut sum: F::With<L> = block.zero();
         for pair in pairs {
-            let weight = pair.value * block.same(self.volume[pair.j]);
+            let weight = pair.value * block.same(pair.other.volume);
             let value = block.all(&self.field[pair.j]);
             weights = weights + weight;
             sum = Parts::from_parts(|k| value.part(k).multiply_add(weight, sum.part(k)));
