@@ -110,6 +110,10 @@ impl<const D: usize, T: Element> Mover<D, T> {
 pub trait Sums<const D: usize, T: Element> {
     /// What they need of each pair.
     const NEEDS: Needs;
+    fn fetch(&self) -> impl Fn(usize) + use<Self, D, T> {
+        |_| {}
+    }
+
     /// Sums over all pairs of a block, in ascending key of the other particle, and keeps what comes out. Pairs outside the
     /// support in a lane have slope and value 0 there.
     fn block<'a, L: Lanes<Element = T>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>);
@@ -240,7 +244,8 @@ const TOGETHER: usize = 32;
 const AHEAD: usize = 24;
 
 /// What is near a block, some candidates at a time.
-struct Near<'a, 'f, const D: usize, L: Lanes, K> {
+struct Near<'a, 'f, const D: usize, L: Lanes, K, H> {
+    fetch: H,
     token: L::Token,
     place: LanesOfPlaces<D, L>,
     movers: &'a [Mover<D, L::Element>],
@@ -278,7 +283,7 @@ impl<L: Lanes> Found<L> {
     }
 }
 
-impl<'a, const D: usize, L: Lanes, K: Kernel> Near<'a, '_, D, L, K> {
+impl<'a, const D: usize, L: Lanes, K: Kernel, H: Fn(usize)> Near<'a, '_, D, L, K, H> {
     /// The next candidates within the support of any particle of the block.
     #[inline(always)]
     fn find(&mut self) {
@@ -287,6 +292,7 @@ impl<'a, const D: usize, L: Lanes, K: Kernel> Near<'a, '_, D, L, K> {
             let Some(&j) = self.candidates.next() else { break };
             if let Some(&ahead) = self.candidates.as_slice().get(AHEAD) {
                 prefetch(&self.movers[ahead as usize]);
+                (self.fetch)(ahead as usize);
             }
             let r2 = self.difference(&self.movers[j as usize]).norm2();
             // What is too far is written over by the next one: no branch.
@@ -328,7 +334,7 @@ impl<'a, const D: usize, L: Lanes, K: Kernel> Near<'a, '_, D, L, K> {
     }
 }
 
-impl<'a, const D: usize, L: Lanes, K: Kernel> Iterator for Near<'a, '_, D, L, K> {
+impl<'a, const D: usize, L: Lanes, K: Kernel, H: Fn(usize)> Iterator for Near<'a, '_, D, L, K, H> {
     type Item = Pair<'a, D, L>;
 
     #[inline(always)]
@@ -394,7 +400,8 @@ impl<const D: usize, T: Element, K: Kernel, Q: Sums<D, T>> WithSimd for Run<'_, 
             let end = start + block.end;
             for first in (start + block.start..end).step_by(T::Lanes::<S>::LANES) {
                 let block = Block::<T::Lanes<S>> { token, first, last: end - 1 };
-                let near = Near::<'_, '_, D, T::Lanes<S>, K> {
+                let near = Near::<'_, '_, D, T::Lanes<S>, K, _> {
+                    fetch: self.sums.fetch(),
                     token,
                     place: block.own_of(movers, |mover| &mover.place),
                     movers,

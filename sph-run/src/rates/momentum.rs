@@ -1,7 +1,7 @@
 //! Acceleration by stress and by the linear artificial viscosity.
 
 use crate::algebra::{Matrix, Sym, Vector};
-use crate::lanes::{Element, Lanes, Parts};
+use crate::lanes::{Element, Lanes, Parts, prefetch};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 use crate::physics::Kernel;
@@ -137,10 +137,16 @@ struct Momentum<'a, const D: usize, T: Element, F, S> {
     space: PhantomData<S>,
 }
 
-impl<const D: usize, const N: usize, T: Element, F: Traction<D, N, T>, S: Space<D, N>> Sums<D, T>
-    for Momentum<'_, D, T, F, (S, [(); N])>
+impl<'b, const D: usize, const N: usize, T: Element, F: Traction<D, N, T>, S: Space<D, N>> Sums<D, T>
+    for Momentum<'b, D, T, F, (S, [(); N])>
 {
     const NEEDS: Needs = Needs::SLOPE;
+
+    #[inline(always)]
+    fn fetch(&self) -> impl Fn(usize) + use<'b, D, N, T, F, S> {
+        let stressed = self.stressed;
+        move |j| prefetch(&stressed[j])
+    }
 
     #[inline(always)]
     fn block<'a, L: Lanes<Element = T>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
