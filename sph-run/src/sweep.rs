@@ -238,7 +238,7 @@ impl<L: Lanes> Block<L> {
 /// Pairs of a block that are found, weighed and summed together. Each of the three loops has a short chain of operations
 /// for a pair; one loop would have a long one, of which a processor overlaps too few. What is found of more candidates would
 /// push the particles out of the nearest cache.
-const TOGETHER: usize = 32;
+const TOGETHER: usize = 64;
 
 /// Candidates from the one at hand to the one that is fetched.
 const AHEAD: usize = 24;
@@ -249,7 +249,9 @@ struct Near<'a, 'f, const D: usize, L: Lanes, K, H> {
     token: L::Token,
     place: LanesOfPlaces<D, L>,
     movers: &'a [Mover<D, L::Element>],
-    candidates: std::slice::Iter<'a, u32>,
+    candidates: &'a [u32],
+    /// Of which some were found.
+    j: &'a [u32],
     scales: &'f Scales<L>,
     needs: Needs,
     kernel: PhantomData<K>,
@@ -262,7 +264,7 @@ type LanesOfPlaces<const D: usize, L> = <<<L as Lanes>::Element as Element>::Pla
 
 /// Found, and not yet summed.
 struct Found<L> {
-    j: [u32; TOGETHER],
+    at: [u32; TOGETHER],
     /// Squared distance.
     r2: [Line<L>; TOGETHER],
     /// 1/r
@@ -279,38 +281,40 @@ struct Line<L>(L);
 impl<L: Lanes> Found<L> {
     fn new(zero: L) -> Self {
         let room = [Line(zero); TOGETHER];
-        Self { j: [0; TOGETHER], r2: room, inverse: room, slope: room, value: room }
+        Self { at: [0; TOGETHER], r2: room, inverse: room, slope: room, value: room }
     }
 }
 
 impl<'a, const D: usize, L: Lanes, K: Kernel, H: Fn(usize)> Near<'a, '_, D, L, K, H> {
-    /// The next candidates within the support of any particle of the block.
+    /// Of the next candidates those within the support of any particle of the block.
     #[inline(always)]
     fn find(&mut self) {
+        let (some, rest) = self.candidates.split_at(self.candidates.len().min(TOGETHER));
         let mut count = 0;
-        while count < TOGETHER {
-            let Some(&j) = self.candidates.next() else { break };
-            if let Some(&ahead) = self.candidates.as_slice().get(AHEAD) {
+        for (n, &j) in some.iter().enumerate() {
+            if let Some(&ahead) = self.candidates.get(n + AHEAD) {
                 prefetch(&self.movers[ahead as usize]);
                 (self.fetch)(ahead as usize);
             }
             let r2 = self.difference(&self.movers[j as usize]).norm2();
+            self.found.r2[n % TOGETHER] = Line(r2);
             // What is too far is written over by the next one: no branch.
-            (self.found.j[count], self.found.r2[count]) = (j, Line(r2));
+            self.found.at[count % TOGETHER] = n as u32;
             count += usize::from(r2.any_below(self.scales.support2));
         }
-        self.count = count;
+        (self.candidates, self.j, self.count) = (rest, some, count);
     }
 
     /// The kernel of all that was found.
     #[inline(always)]
     fn weigh(&mut self) {
         let (found, scales, needs) = (&mut *self.found, self.scales, self.needs);
-        let Found { r2, inverse, slope, value, .. } = found;
+        let Found { at, r2, inverse, slope, value, .. } = found;
         let count = self.count.min(TOGETHER);
         for n in 0..count {
-            r2[n].0 = r2[n].0.largest(scales.nearest2);
-            inverse[n].0 = r2[n].0.closer_inverse_root(r2[n].0.rough_inverse_root());
+            let far = r2[at[n] as usize % TOGETHER].0.largest(scales.nearest2);
+            r2[n].0 = far;
+            inverse[n].0 = far.closer_inverse_root(far.rough_inverse_root());
         }
         for _ in 1..L::REFINEMENTS {
             for n in 0..count {
@@ -339,18 +343,18 @@ impl<'a, const D: usize, L: Lanes, K: Kernel, H: Fn(usize)> Iterator for Near<'a
 
     #[inline(always)]
     fn next(&mut self) -> Option<Self::Item> {
-        if self.next == self.count {
+        while self.next == self.count {
+            if self.candidates.is_empty() {
+                return None;
+            }
             self.find();
             self.weigh();
             self.next = 0;
-            if self.count == 0 {
-                return None;
-            }
         }
         let n = self.next % TOGETHER;
         self.next += 1;
-        let Found { j, inverse, slope, value, .. } = &*self.found;
-        let j = j[n] as usize;
+        let Found { at, inverse, slope, value, .. } = &*self.found;
+        let j = self.j[at[n] as usize] as usize;
         let other = &self.movers[j];
         let d = self.difference(other);
         Some(Pair { j, other, d, inverse: inverse[n].0, slope: slope[n].0, value: value[n].0 })
@@ -405,7 +409,8 @@ impl<const D: usize, T: Element, K: Kernel, Q: Sums<D, T>> WithSimd for Run<'_, 
                     token,
                     place: block.own_of(movers, |mover| &mover.place),
                     movers,
-                    candidates: candidates.iter(),
+                    candidates,
+                    j: &[],
                     scales,
                     needs: Q::NEEDS,
                     kernel: PhantomData,
