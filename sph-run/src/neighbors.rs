@@ -5,10 +5,10 @@
 //! built, nor on the blocks.
 
 use crate::algebra::Vector;
-use crate::lanes::{Doubles, Element, Lanes, Parts};
+use crate::lanes::{Doubles, Element, Lanes, Parts, prefetch};
 use crate::particles::Particles;
 use crate::physics::Kernel;
-use crate::sweep::{Mover, Pairs, Precision, Sums, Sweep};
+use crate::sweep::{AHEAD, Mover, Pairs, Precision, Sums, Sweep, weight};
 use pulp::{Simd, WithSimd};
 use std::ops::Range;
 
@@ -41,6 +41,17 @@ impl Lists {
         self.count
     }
 
+    fn clear(&mut self, count: usize, block: usize) {
+        (self.count, self.block) = (count, block);
+        self.starts.clear();
+        self.starts.push(0);
+        self.candidates.clear();
+    }
+
+    fn close(&mut self) {
+        self.starts.push(u32::try_from(self.candidates.len()).expect("a rank holds fewer than 2^32 candidates"));
+    }
+
     /// No lists?
     pub fn is_empty(&self) -> bool {
         self.count == 0
@@ -56,27 +67,35 @@ pub struct Neighbors<const D: usize> {
     pub singles: Vec<Mover<D, f32>>,
     /// For the owned particles: particles of all ranges.
     pub of_owned: Lists,
+    /// Of the candidates of owned particles those within the support at this step.
+    near: Lists,
     /// For the wall particles: material particles of all ranges but the walls.
     pub of_wall: Lists,
 }
 
 impl<const D: usize> Neighbors<D> {
     /// Takes over places, velocities and volumes.
-    pub fn refresh<const N: usize>(&mut self, particles: &Particles<D, N>, pairs: Pairs) {
-        self.refresh_from(0, particles, pairs);
+    pub fn refresh<const N: usize, K: Kernel>(&mut self, particles: &Particles<D, N>, pairs: Pairs) {
+        self.refresh_from::<N, K>(0, particles, pairs);
     }
 
     /// As [`Neighbors::refresh`], of the particles from index `first` on.
-    pub fn refresh_from<const N: usize>(&mut self, first: usize, particles: &Particles<D, N>, pairs: Pairs) {
-        movers(first, particles, f64::unit(pairs.h), &mut self.movers);
+    pub fn refresh_from<const N: usize, K: Kernel>(&mut self, first: usize, particles: &Particles<D, N>, pairs: Pairs) {
+        movers::<D, N, K, f64>(first, particles, pairs.h, &mut self.movers);
         if pairs.precision == Precision::Mixed {
-            movers(first, particles, f32::unit(pairs.h), &mut self.singles);
+            movers::<D, N, K, f32>(first, particles, pairs.h, &mut self.singles);
         }
+    }
+
+    /// Finds what is within the support now: sweeps go over that.
+    pub fn find(&mut self, pairs: Pairs) {
+        let (lists, near, movers) = (&self.of_owned, &mut self.near, &self.movers[..]);
+        pairs.instructions.run(Find { lists, near, movers, support: 2.0 * pairs.h });
     }
 
     /// Sums over the pairs of the owned particles.
     pub fn sweep<K: Kernel, T: Element>(&self, pairs: Pairs, sums: &mut impl Sums<D, T>) {
-        let sweep = Sweep { movers: T::movers(self), lists: &self.of_owned, first: 0 };
+        let sweep = Sweep { movers: T::movers(self), lists: &self.near, first: 0 };
         sweep.run::<K>(pairs.h / T::unit(pairs.h), pairs.instructions, sums);
     }
 
@@ -100,14 +119,79 @@ impl<const D: usize> Neighbors<D> {
     }
 }
 
-fn movers<const D: usize, const N: usize, T: Element>(
+/// Those candidates that are within the support of a particle of their block.
+struct Find<'a, const D: usize> {
+    lists: &'a Lists,
+    near: &'a mut Lists,
+    movers: &'a [Mover<D, f64>],
+    support: f64,
+}
+
+impl<const D: usize> WithSimd for Find<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, token: S) {
+        let Self { lists, near, movers, support } = self;
+        near.clear(lists.count, lists.block);
+        // A little more, lest the f32 of mixed precision miss any: there the kernel is zero all the same.
+        let support2 = Doubles::all(token, support * support * (1.0 + 1e-5));
+        match lists.block / Doubles::<S>::LANES {
+            1 => find::<D, S, 1>(token, lists, near, movers, support2),
+            2 => find::<D, S, 2>(token, lists, near, movers, support2),
+            _ => find::<D, S, 4>(token, lists, near, movers, support2),
+        }
+    }
+}
+
+/// With blocks of R registers.
+#[inline(always)]
+fn find<const D: usize, S: Simd, const R: usize>(
+    token: S,
+    lists: &Lists,
+    near: &mut Lists,
+    movers: &[Mover<D, f64>],
+    support2: Doubles<S>,
+) {
+    for (block, candidates) in lists.blocks() {
+        let last = block.end - 1;
+        let mut own: [Vector<D, Doubles<S>>; R] = [Vector::from_parts(|_| support2); R];
+        for (r, own) in own.iter_mut().enumerate() {
+            let first = block.start + r * Doubles::<S>::LANES;
+            *own = Vector::from_parts(|a| Doubles::each(token, |k| movers[(first + k).min(last)].place.0[a]));
+        }
+        // Room for all: what is too far is written over by the next one, without a branch.
+        let mut end = near.candidates.len();
+        near.candidates.resize(end + candidates.len(), 0);
+        let found = &mut near.candidates[..];
+        for (n, &j) in candidates.iter().enumerate() {
+            if let Some(&ahead) = candidates.get(n + AHEAD) {
+                prefetch(&movers[ahead as usize]);
+            }
+            let place = &movers[j as usize].place;
+            let place = Vector::from_parts(|a| Doubles::all(token, place.0[a]));
+            let mut within = false;
+            for r in 0..R {
+                within |= (own[r] - place).norm2().any_below(support2);
+            }
+            found[end] = j;
+            end += usize::from(within);
+        }
+        near.candidates.truncate(end);
+        near.close();
+    }
+}
+
+fn movers<const D: usize, const N: usize, K: Kernel, T: Element>(
     first: usize,
     p: &Particles<D, N>,
-    unit: f64,
+    h: f64,
     movers: &mut Vec<Mover<D, T>>,
 ) {
+    let unit = T::unit(h);
+    let per_volume = weight::<D, K>(h, unit);
     movers.truncate(first);
-    movers.extend((first..p.len()).map(|i| Mover::new(p.x[i], p.v[i], p.volume[i], unit)));
+    movers.extend((first..p.len()).map(|i| Mover::new(p.x[i], p.v[i], p.volume[i] * per_volume, unit)));
 }
 
 /// Lists for blocks of the particles at `x`.
@@ -126,11 +210,7 @@ impl<const D: usize> WithSimd for Build<'_, D> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, token: S) {
         let Self { lists, cells, x, by_key, reach, block } = self;
-        lists.count = x.len();
-        lists.block = block;
-        lists.starts.clear();
-        lists.starts.push(0);
-        lists.candidates.clear();
+        lists.clear(x.len(), block);
         let reach2 = Doubles::all(token, reach * reach);
         let mut found: Vec<u32> = Vec::new();
         let mut runs = Vec::new();
@@ -161,7 +241,7 @@ impl<const D: usize> WithSimd for Build<'_, D> {
             }
             found.sort_unstable();
             lists.candidates.extend(found.iter().map(|&number| by_key[number as usize]));
-            lists.starts.push(u32::try_from(lists.candidates.len()).expect("a rank holds fewer than 2^32 candidates"));
+            lists.close();
         }
         lists.candidates.shrink_to(lists.candidates.len() + lists.candidates.len() / 8);
     }

@@ -12,10 +12,10 @@ use std::marker::PhantomData;
 pub trait Kernel: Copy + Send + Sync + 'static {
     /// Its name, shape and normalisation.
     const KIND: Kind;
-    /// W = norm VALUE h^-VALUE_POWER value(r)
+    /// W = norm VALUE h^-VALUE_POWER value(r), with the norm of W in D dimensions.
     const VALUE: f64;
     const VALUE_POWER: i32;
-    /// W'/r = norm SLOPE h^-SLOPE_POWER slope(r)
+    /// W'/r = norm SLOPE h^-SLOPE_POWER slope(r), with the norm of W in D dimensions.
     const SLOPE: f64;
     const SLOPE_POWER: i32;
 
@@ -33,18 +33,18 @@ impl Kernel for CubicSpline {
     // ((2-q)+^3 - 4 (1-q)+^3)/6
     const VALUE: f64 = 1.0 / 6.0;
     const VALUE_POWER: i32 = 3;
-    const SLOPE: f64 = -0.5;
+    const SLOPE: f64 = 0.5;
     const SLOPE_POWER: i32 = 3;
 
     #[inline(always)]
     fn value<L: Lanes>(r: L, scales: &Scales<L>) -> L {
         let (outer, inner) = (scales.outer(r), scales.inner(r));
-        (inner * inner * inner).multiply_add(scales.minus_four, outer * outer * outer)
+        (-(inner * inner * inner)).multiply_add(scales.four, outer * outer * outer)
     }
     #[inline(always)]
     fn slope<L: Lanes>(r: L, inverse: L, scales: &Scales<L>) -> L {
         let (outer, inner) = (scales.outer(r), scales.inner(r));
-        (inner * inner).multiply_add(scales.minus_four, outer * outer) * inverse
+        (inner * inner).multiply_add(scales.four, -(outer * outer)) * inverse
     }
 }
 
@@ -56,7 +56,7 @@ impl Kernel for WendlandC2 {
     const VALUE: f64 = 1.0 / 16.0;
     const VALUE_POWER: i32 = 5;
     // -5 (1 - q/2)+^3
-    const SLOPE: f64 = -5.0 / 8.0;
+    const SLOPE: f64 = 5.0 / 8.0;
     const SLOPE_POWER: i32 = 5;
 
     #[inline(always)]
@@ -67,7 +67,7 @@ impl Kernel for WendlandC2 {
     #[inline(always)]
     fn slope<L: Lanes>(r: L, _: L, scales: &Scales<L>) -> L {
         let outer = scales.outer(r);
-        outer * outer * outer
+        -(outer * outer * outer)
     }
 }
 

@@ -205,11 +205,12 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
     /// Velocities of wall particles, from the material around them; then sweeps can begin.
     fn reflect_motion(&mut self) {
         let (p, pairs) = (&mut self.particles, self.parameters.pairs);
-        self.neighbors.refresh(p, pairs);
+        self.neighbors.refresh::<N, P::Kernel>(p, pairs);
         if self.walls.has_sites() {
             self.walls.fill_motion::<D, N, P::Space, P::Kernel>(p, &self.neighbors, pairs);
-            self.neighbors.refresh_from(p.mirror, p, pairs);
+            self.neighbors.refresh_from::<N, P::Kernel>(p.mirror, p, pairs);
         }
+        self.neighbors.find(pairs);
     }
 
     /// Brings everything around the owned particles up to date, in the one order that is right: halo, then images of

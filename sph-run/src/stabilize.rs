@@ -165,7 +165,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             return;
         }
         // Volumes have changed with the densities.
-        self.neighbors.refresh(&self.particles, self.parameters.pairs);
+        self.neighbors.refresh::<N, P::Kernel>(&self.particles, self.parameters.pairs);
         let (p, neighbors, pairs) = (&self.particles, &self.neighbors, self.parameters.pairs);
         let Stabilisers { artificial_stress: epsilon, impact, .. } = self.parameters.stabilisers;
         let Buffers { heat, opposing, .. } = &mut self.buffers;

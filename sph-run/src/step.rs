@@ -14,7 +14,7 @@ use crate::rates::{
 use crate::simulation::Simulation;
 use crate::space::Space;
 use crate::stabilize::Buffers;
-use crate::sweep::Precision;
+use crate::sweep::{Precision, weight};
 use crate::timestep::Plan;
 
 impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
@@ -143,7 +143,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     ) {
         let (p, parameters) = (&self.particles, &self.parameters);
         let (pairs, viscosity) = (parameters.pairs, parameters.viscosity);
-        Stressed::all::<D, N, P::Space, G>(p, pairs.spacing, T::unit(pairs.h), weighted, stressed);
+        let per_volume = weight::<D, P::Kernel>(pairs.h, T::unit(pairs.h));
+        Stressed::all::<D, N, P::Space, G>(p, pairs.spacing, per_volume, weighted, stressed);
         heat.resize(p.owned, 0.0);
         momentum::<D, N, P::Space, P::Kernel, F, T>(p, &self.neighbors, pairs, viscosity, stressed, a, heat);
     }

@@ -34,44 +34,27 @@ pub struct Scales<T> {
     /// h
     pub h: T,
     support: T,
-    support2: T,
     nearest2: T,
-    /// Factors of [`Kernel::value`] and [`Kernel::slope`].
-    value: T,
-    slope: T,
     zero: T,
-    pub minus_four: T,
+    pub four: T,
 }
 
 impl<T: Element> Scales<T> {
-    fn new<const D: usize, K: Kernel>(h: f64) -> Self {
-        let norm = K::KIND.norm(D) / h.powi(D as i32);
+    fn new(h: f64) -> Self {
         Self {
             h: T::of(h),
             support: T::of(2.0 * h),
-            support2: T::of(4.0 * h * h),
             nearest2: T::of((NEAREST * h).powi(2)),
-            value: T::of(norm * K::VALUE / h.powi(K::VALUE_POWER)),
-            slope: T::of(norm * K::SLOPE / h.powi(K::SLOPE_POWER)),
             zero: T::of(0.0),
-            minus_four: T::of(-4.0),
+            four: T::of(4.0),
         }
     }
 
     #[inline(always)]
     fn lanes<L: Lanes<Element = T>>(self, token: L::Token) -> Scales<L> {
-        let Self { h, support, support2, nearest2, value, slope, zero, minus_four } = self;
+        let Self { h, support, nearest2, zero, four } = self;
         let all = |x| L::all(token, x);
-        Scales {
-            h: all(h),
-            support: all(support),
-            support2: all(support2),
-            nearest2: all(nearest2),
-            value: all(value),
-            slope: all(slope),
-            zero: all(zero),
-            minus_four: all(minus_four),
-        }
+        Scales { h: all(h), support: all(support), nearest2: all(nearest2), zero: all(zero), four: all(four) }
     }
 }
 
@@ -92,24 +75,31 @@ impl<L: Lanes> Scales<L> {
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub struct Mover<const D: usize, T: Element> {
-    place: T::Place<D>,
+    pub(crate) place: T::Place<D>,
     /// Velocity, m/s.
     pub v: Vector<D, T>,
-    /// Volume.
-    pub volume: T,
+    /// Volume times the constant that the slopes of pairs lack: see [`weight`].
+    pub weight: T,
 }
 
 impl<const D: usize, T: Element> Mover<D, T> {
-    /// Of a place, a velocity and a volume; places over a unit of length, volumes over its power.
-    pub fn new(x: Vector<D>, v: Vector<D>, volume: f64, unit: f64) -> Self {
-        Self { place: T::place(x, unit), v: Vector(v.0.map(T::of)), volume: T::of(volume / unit.powi(D as i32)) }
+    /// Of a place over a unit of length, a velocity, and a weight.
+    pub fn new(x: Vector<D>, v: Vector<D>, weight: f64, unit: f64) -> Self {
+        Self { place: T::place(x, unit), v: Vector(v.0.map(T::of)), weight: T::of(weight) }
     }
+}
+
+/// What a volume is multiplied by, so that weight times slope is V W'/r: V, W and r in a unit of length. Positive.
+pub fn weight<const D: usize, K: Kernel>(h: f64, unit: f64) -> f64 {
+    K::KIND.norm(D) / h.powi(D as i32) * K::SLOPE / (h / unit).powi(K::SLOPE_POWER)
 }
 
 /// Sums over pairs for the particles of one block.
 pub trait Sums<const D: usize, T: Element> {
     /// What they need of each pair.
     const NEEDS: Needs;
+    /// Asks for what they need of a particle that comes soon, beside the particle itself.
+    #[inline(always)]
     fn fetch(&self) -> impl Fn(usize) + use<Self, D, T> {
         |_| {}
     }
@@ -151,11 +141,11 @@ pub struct Pair<'a, const D: usize, L: Lanes> {
     pub other: &'a Mover<D, L::Element>,
     /// x_i - x_j.
     pub d: Vector<D, L>,
-    /// grad_i W = slope d.
+    /// Times the other's weight it is V_j s with grad_i W = s d.
     pub slope: L,
     /// 1/r, at most 1000/h.
     pub inverse: L,
-    /// W.
+    /// W up to a constant factor.
     pub value: L,
 }
 
@@ -235,37 +225,35 @@ impl<L: Lanes> Block<L> {
     }
 }
 
-/// Pairs of a block that are found, weighed and summed together. Each of the three loops has a short chain of operations
-/// for a pair; one loop would have a long one, of which a processor overlaps too few. What is found of more candidates would
-/// push the particles out of the nearest cache.
-const TOGETHER: usize = 64;
+/// Pairs of a block that are weighed and summed together. Each of the loops has a short chain of operations for a pair; one
+/// loop would have a long one, of which a processor overlaps too few. More at a time would push the particles out of the
+/// nearest cache.
+const TOGETHER: usize = 32;
 
 /// Candidates from the one at hand to the one that is fetched.
-const AHEAD: usize = 24;
+pub(crate) const AHEAD: usize = 24;
 
-/// What is near a block, some candidates at a time.
+/// Pairs of a block with all that is near, some at a time.
 struct Near<'a, 'f, const D: usize, L: Lanes, K, H> {
-    fetch: H,
     token: L::Token,
     place: LanesOfPlaces<D, L>,
     movers: &'a [Mover<D, L::Element>],
-    candidates: &'a [u32],
-    /// Of which some were found.
-    j: &'a [u32],
+    /// Not yet weighed.
+    rest: &'a [u32],
+    /// Weighed, and the next of them.
+    some: &'a [u32],
+    next: usize,
+    weighed: &'f mut Weighed<L>,
     scales: &'f Scales<L>,
     needs: Needs,
+    fetch: H,
     kernel: PhantomData<K>,
-    next: usize,
-    count: usize,
-    found: &'f mut Found<L>,
 }
 
 type LanesOfPlaces<const D: usize, L> = <<<L as Lanes>::Element as Element>::Place<D> as Parts>::With<L>;
 
-/// Found, and not yet summed.
-struct Found<L> {
-    at: [u32; TOGETHER],
-    /// Squared distance.
+/// The kernel of some pairs.
+struct Weighed<L> {
     r2: [Line<L>; TOGETHER],
     /// 1/r
     inverse: [Line<L>; TOGETHER],
@@ -278,58 +266,45 @@ struct Found<L> {
 #[repr(align(64))]
 struct Line<L>(L);
 
-impl<L: Lanes> Found<L> {
+impl<L: Lanes> Weighed<L> {
     fn new(zero: L) -> Self {
         let room = [Line(zero); TOGETHER];
-        Self { at: [0; TOGETHER], r2: room, inverse: room, slope: room, value: room }
+        Self { r2: room, inverse: room, slope: room, value: room }
     }
 }
 
 impl<'a, const D: usize, L: Lanes, K: Kernel, H: Fn(usize)> Near<'a, '_, D, L, K, H> {
-    /// Of the next candidates those within the support of any particle of the block.
+    /// The kernel of some more pairs.
     #[inline(always)]
-    fn find(&mut self) {
-        let (some, rest) = self.candidates.split_at(self.candidates.len().min(TOGETHER));
-        let mut count = 0;
+    fn weigh(&mut self) {
+        let (some, rest) = self.rest.split_at(self.rest.len().min(TOGETHER));
         for (n, &j) in some.iter().enumerate() {
-            if let Some(&ahead) = self.candidates.get(n + AHEAD) {
+            if let Some(&ahead) = self.rest.get(n + AHEAD) {
                 prefetch(&self.movers[ahead as usize]);
                 (self.fetch)(ahead as usize);
             }
-            let r2 = self.difference(&self.movers[j as usize]).norm2();
-            self.found.r2[n % TOGETHER] = Line(r2);
-            // What is too far is written over by the next one: no branch.
-            self.found.at[count % TOGETHER] = n as u32;
-            count += usize::from(r2.any_below(self.scales.support2));
+            let r2 = self.difference(&self.movers[j as usize]).norm2().largest(self.scales.nearest2);
+            let weighed = &mut *self.weighed;
+            weighed.r2[n].0 = r2;
+            weighed.inverse[n].0 = r2.closer_inverse_root(r2.rough_inverse_root());
         }
-        (self.candidates, self.j, self.count) = (rest, some, count);
-    }
-
-    /// The kernel of all that was found.
-    #[inline(always)]
-    fn weigh(&mut self) {
-        let (found, scales, needs) = (&mut *self.found, self.scales, self.needs);
-        let Found { at, r2, inverse, slope, value, .. } = found;
-        let count = self.count.min(TOGETHER);
-        for n in 0..count {
-            let far = r2[at[n] as usize % TOGETHER].0.largest(scales.nearest2);
-            r2[n].0 = far;
-            inverse[n].0 = far.closer_inverse_root(far.rough_inverse_root());
-        }
+        let Weighed { r2, inverse, slope, value } = &mut *self.weighed;
+        let (scales, needs) = (self.scales, self.needs);
         for _ in 1..L::REFINEMENTS {
-            for n in 0..count {
+            for n in 0..some.len() {
                 inverse[n].0 = r2[n].0.closer_inverse_root(inverse[n].0);
             }
         }
-        for n in 0..count {
+        for n in 0..some.len() {
             let r = r2[n].0 * inverse[n].0;
             if needs.slope {
-                slope[n].0 = K::slope(r, inverse[n].0, scales) * scales.slope;
+                slope[n].0 = K::slope(r, inverse[n].0, scales);
             }
             if needs.value {
-                value[n].0 = K::value(r, scales) * scales.value;
+                value[n].0 = K::value(r, scales);
             }
         }
+        (self.some, self.rest, self.next) = (some, rest, 0);
     }
 
     #[inline(always)]
@@ -343,20 +318,19 @@ impl<'a, const D: usize, L: Lanes, K: Kernel, H: Fn(usize)> Iterator for Near<'a
 
     #[inline(always)]
     fn next(&mut self) -> Option<Self::Item> {
-        while self.next == self.count {
-            if self.candidates.is_empty() {
+        if self.next == self.some.len() {
+            if self.rest.is_empty() {
                 return None;
             }
-            self.find();
             self.weigh();
-            self.next = 0;
         }
-        let n = self.next % TOGETHER;
+        let n = self.next;
         self.next += 1;
-        let Found { at, inverse, slope, value, .. } = &*self.found;
-        let j = self.j[at[n] as usize] as usize;
+        let j = self.some[n] as usize;
         let other = &self.movers[j];
+        let Weighed { inverse, slope, value, .. } = &*self.weighed;
         let d = self.difference(other);
+        let n = n % TOGETHER;
         Some(Pair { j, other, d, inverse: inverse[n].0, slope: slope[n].0, value: value[n].0 })
     }
 }
@@ -380,7 +354,7 @@ pub struct Sweep<'a, const D: usize, T: Element> {
 impl<const D: usize, T: Element> Sweep<'_, D, T> {
     /// Calls [`Sums::block`] for every block. `h`: smoothing length in the movers' unit.
     pub fn run<K: Kernel>(self, h: f64, instructions: Instructions, sums: &mut impl Sums<D, T>) {
-        let scales = Scales::new::<D, K>(h);
+        let scales = Scales::new(h);
         instructions.run(Run::<'_, D, T, K, _> { sweep: self, scales, sums, kernel: PhantomData });
     }
 }
@@ -399,24 +373,23 @@ impl<const D: usize, T: Element, K: Kernel, Q: Sums<D, T>> WithSimd for Run<'_, 
     fn with_simd<S: Simd>(self, token: S) {
         let Sweep { movers, lists, first: start } = self.sweep;
         let scales = &self.scales.lanes::<T::Lanes<S>>(token);
-        let found = &mut Found::new(scales.zero);
-        for (block, candidates) in lists.blocks() {
+        let weighed = &mut Weighed::new(scales.zero);
+        for (block, near) in lists.blocks() {
             let end = start + block.end;
             for first in (start + block.start..end).step_by(T::Lanes::<S>::LANES) {
                 let block = Block::<T::Lanes<S>> { token, first, last: end - 1 };
                 let near = Near::<'_, '_, D, T::Lanes<S>, K, _> {
-                    fetch: self.sums.fetch(),
                     token,
                     place: block.own_of(movers, |mover| &mover.place),
                     movers,
-                    candidates,
-                    j: &[],
+                    rest: near,
+                    some: &[],
+                    next: 0,
+                    weighed,
                     scales,
                     needs: Q::NEEDS,
+                    fetch: self.sums.fetch(),
                     kernel: PhantomData,
-                    next: 0,
-                    count: 0,
-                    found,
                 };
                 self.sums.block(block, near);
             }

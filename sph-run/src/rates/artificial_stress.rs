@@ -35,7 +35,7 @@ pub fn artificial_stress<const D: usize, const N: usize, S: Space<D, N>, K: Kern
 ) {
     let mut force = vec![Vector::default(); particles.owned];
     let shape = |r: f64| K::KIND.shape(r / pairs.h);
-    let near = K::KIND.norm(D) / pairs.h.powi(D as i32) * shape(pairs.spacing);
+    let near = shape(pairs.spacing) * pairs.h.powi(K::VALUE_POWER) / K::VALUE;
     let exponent = shape(0.0) / shape(pairs.spacing);
     let sums = Repulsion { opposing, near, exponent, force: &mut force, space: PhantomData };
     let mut sums: Repulsion<'_, D, N, S> = sums;
@@ -47,7 +47,7 @@ pub fn artificial_stress<const D: usize, const N: usize, S: Space<D, N>, K: Kern
 
 struct Repulsion<'a, const D: usize, const N: usize, S> {
     opposing: &'a [Sym<N>],
-    /// W(dx)
+    /// W(dx), with the factor that the values of pairs have.
     near: f64,
     exponent: f64,
     force: &'a mut [Vector<D>],
@@ -69,7 +69,7 @@ impl<const D: usize, const N: usize, S: Space<D, N>> Sums<D, f64> for Repulsion<
             if in_tension || *other != Sym::default() {
                 let value = pair.value;
                 let f = block.lanes(|k| (value.lane(k) / self.near).powf(self.exponent));
-                let weight = f * block.same(pair.other.volume) * pair.slope;
+                let weight = f * block.same(pair.other.weight) * pair.slope;
                 sum += <Sym<N> as Traction<D, N, f64>>::on::<S, L>(own, block.all(other), zero, pair.d * weight);
             }
         }

@@ -66,7 +66,7 @@ impl<const D: usize> Sums<D, f64> for Moments<'_, D> {
     fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
         let mut sum: Matrix<D, L> = block.zero();
         for pair in pairs.filter(|pair| pair.j < self.end) {
-            let weight = block.same(-pair.other.volume) * pair.slope;
+            let weight = block.same(-pair.other.weight) * pair.slope;
             sum.add_outer(pair.d * weight, pair.d);
         }
         block.put(self.moments, sum);

@@ -46,7 +46,7 @@ impl<const D: usize, F: Diffusing> Sums<D, f64> for Gradient<'_, D, F> {
         let own = block.own(self.field);
         let mut sum: [F::With<L>; D] = block.zero();
         for pair in pairs.filter(|pair| pair.j < self.end) {
-            let weight = block.same(pair.other.volume) * pair.slope;
+            let weight = block.same(pair.other.weight) * pair.slope;
             let other = block.all(&self.field[pair.j]);
             for a in 0..D {
                 let way = pair.d.0[a] * weight;
@@ -100,7 +100,7 @@ impl<const D: usize, F: Diffusing> Sums<D, f64> for Diffusion<'_, D, F> {
         let mut sum: F::With<L> = block.zero();
         for pair in pairs.filter(|pair| pair.j < self.end) {
             // x_ji . grad W/r^2 = -slope.
-            let weight = block.same(-pair.other.volume) * pair.slope;
+            let weight = block.same(-pair.other.weight) * pair.slope;
             let (other, slope_there) = (block.all(&self.field[pair.j]), block.all(&self.gradient[pair.j]));
             sum = Parts::from_parts(|k| {
                 let mut psi = (other.part(k) - own.part(k)) * two;

@@ -67,30 +67,30 @@ pub struct Viscosity {
 pub struct Stressed<F, T> {
     /// w sigma, or w sigma L.
     weighted: F,
-    volume: T,
+    /// As [`Mover::weight`].
+    weight: T,
     /// |w|/2: image rings have negative radii, and the mean distance from the axis weighs the viscosity.
     radius: T,
 }
 
 impl<F: Parts> Stressed<F, F::Number> {
-    /// All particles, with `weighted(i)` = w sigma or w sigma L of each.
+    /// All particles, with `weighted(i)` = w sigma or w sigma L of each. `per_volume`: [`crate::sweep::weight`].
     pub fn all<const D: usize, const N: usize, S: Space<D, N>, G: Parts<Number = f64>>(
         particles: &Particles<D, N>,
         spacing: f64,
-        unit: f64,
+        per_volume: f64,
         weighted: impl Fn(usize) -> G,
         stressed: &mut Vec<Self>,
     ) where
         F::Number: Element,
     {
         let of = F::Number::of;
-        let per_volume = 1.0 / unit.powi(D as i32);
         stressed.clear();
         stressed.extend((0..particles.len()).map(|i| {
             let weighted = weighted(i);
             Self {
                 weighted: F::from_parts(|k| of(weighted.part(k))),
-                volume: of(particles.volume[i] * per_volume),
+                weight: of(particles.volume[i] * per_volume),
                 radius: of(half_radius::<D, N, S>(particles.x[i], spacing)),
             }
         }));
@@ -164,7 +164,7 @@ impl<'b, const D: usize, const N: usize, T: Element, F: Traction<D, N, T>, S: Sp
             if S::WEIGHTED {
                 push = push * (radius + block.same(other.radius));
             }
-            let weight = block.same(other.volume) * pair.slope;
+            let weight = block.same(other.weight) * pair.slope;
             sum += F::on::<S, L>(own, block.all(&other.weighted), push, pair.d * weight);
             power = (push * approach).multiply_add(weight, power);
         }

@@ -43,7 +43,7 @@ impl<const D: usize> Sums<D, f64> for Divergence<'_> {
     fn block<'a, L: Lanes<Element = f64>>(&mut self, block: Block<L>, pairs: impl Iterator<Item = Pair<'a, D, L>>) {
         let mut sum = block.number(0.0);
         for pair in pairs {
-            let weight = block.same(-pair.other.volume) * pair.slope;
+            let weight = block.same(-pair.other.weight) * pair.slope;
             sum = pair.d.norm2().multiply_add(weight, sum);
         }
         block.put(self.divergence, sum);
@@ -99,7 +99,7 @@ impl<const D: usize> Sums<D, f64> for Concentration<'_, D> {
         let mut sum: Vector<D, L> = block.zero();
         let mut open = block.own_numbers(self.surface);
         for pair in pairs {
-            let weight = block.same(pair.other.volume) * pair.slope;
+            let weight = block.same(pair.other.weight) * pair.slope;
             sum.add_scaled(weight, pair.d);
             // Of candidates outside the support none counts.
             open = pair.value.multiply_add(block.same(self.surface[pair.j]), open);

@@ -31,7 +31,7 @@ impl<const D: usize, T: Element> Sums<D, T> for VelocityGradient<'_, D, T> {
         let v = block.own_of(self.movers, |mover| &mover.v);
         let mut sum: Matrix<D, L> = block.zero();
         for pair in pairs {
-            let weight = block.same(pair.other.volume) * pair.slope;
+            let weight = block.same(pair.other.weight) * pair.slope;
             sum.add_outer((block.all(&pair.other.v) - v) * weight, pair.d);
         }
         block.put(self.gradient, sum.times_number(block.number(self.scale)));

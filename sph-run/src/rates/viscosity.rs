@@ -103,7 +103,7 @@ impl<const D: usize> Sums<D, f64> for Between<'_, D> {
             };
             let r2 = pair.d.norm2();
             let distance = r2.over(r2 + eta2) * (radius + block.same(self.radius[j]));
-            let weight = block.same(pair.other.volume) * pair.slope * both * distance;
+            let weight = block.same(pair.other.weight) * pair.slope * both * distance;
             let difference = v - block.all(&pair.other.v);
             sum.add_scaled(weight, difference);
             power = difference.norm2().multiply_add(weight, power);
@@ -152,7 +152,7 @@ impl<const D: usize> Sums<D, f64> for Impact<'_, D> {
             let j = pair.j;
             let approach = (v - block.all(&pair.other.v)).dot(pair.d).least(zero);
             let rate = approach.over(pair.d.norm2() + eta2);
-            let weight = block.same(pair.other.volume) * pair.slope * (radius + block.same(self.radius[j]));
+            let weight = block.same(pair.other.weight) * pair.slope * (radius + block.same(self.radius[j]));
             let push = strength * rate * rate * weight;
             sum.add_scaled(push, pair.d);
             power = approach.multiply_add(push, power);

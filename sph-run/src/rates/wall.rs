@@ -36,7 +36,7 @@ impl<const D: usize, F: Parts<Number = f64>> Sums<D, f64> for Shepard<'_, F> {
         let mut weights = block.number(0.0);
         let mut sum: F::With<L> = block.zero();
         for pair in pairs {
-            let weight = pair.value * block.same(pair.other.volume);
+            let weight = pair.value * block.same(pair.other.weight);
             let value = block.all(&self.field[pair.j]);
             weights = weights + weight;
             sum = Parts::from_parts(|k| value.part(k).multiply_add(weight, sum.part(k)));
