@@ -16,20 +16,21 @@ pub trait Job {
 pub fn resolve<J: Job>(scene: &Scene, job: J) -> J::Output {
     match &scene.material {
         Law::DruckerPrager(law) => with_material(scene, DruckerPrager::new(law), job),
-        _ => todo!(),
+        Law::MuI(law) => with_material(scene, MuI::new(law, scene), job),
+        Law::ViscoPlastic(law) => with_material(scene, ViscoPlastic::new(law), job),
     }
 }
 
 fn with_material<J: Job, M: Material + 'static>(scene: &Scene, material: M, job: J) -> J::Output {
     match scene.kernel {
         kernel::Kernel::CubicSpline => with_kernel::<J, CubicSpline, M>(scene, material, job),
-        _ => todo!(),
+        kernel::Kernel::WendlandC2 => with_kernel::<J, WendlandC2, M>(scene, material, job),
     }
 }
 
 fn with_kernel<J: Job, K: Kernel, M: Material + 'static>(scene: &Scene, material: M, job: J) -> J::Output {
     match scene.space {
-        space::Space::PlaneStrain => todo!(),
+        space::Space::PlaneStrain => job.run::<2, 4, Model<PlaneStrain, K, M>>(material),
         space::Space::Axisymmetric => job.run::<2, 4, Model<Axisymmetric, K, M>>(material),
         space::Space::ThreeD => job.run::<3, 6, Model<ThreeD, K, M>>(material),
     }

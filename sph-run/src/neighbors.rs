@@ -88,9 +88,9 @@ impl<const D: usize> Neighbors<D> {
     }
 
     /// Finds what is within the support now: sweeps go over that.
-    pub fn find(&mut self, pairs: Pairs) {
-        let (lists, near, movers) = (&self.of_owned, &mut self.near, &self.movers[..]);
-        pairs.instructions.run(Find { lists, near, movers, support: 2.0 * pairs.h });
+    pub fn find(&mut self, x: &[Vector<D>], pairs: Pairs) {
+        let (lists, near) = (&self.of_owned, &mut self.near);
+        pairs.instructions.run(Find { lists, near, x, support: 2.0 * pairs.h });
     }
 
     /// Sums over the pairs of the owned particles.
@@ -123,7 +123,7 @@ impl<const D: usize> Neighbors<D> {
 struct Find<'a, const D: usize> {
     lists: &'a Lists,
     near: &'a mut Lists,
-    movers: &'a [Mover<D, f64>],
+    x: &'a [Vector<D>],
     support: f64,
 }
 
@@ -132,14 +132,14 @@ impl<const D: usize> WithSimd for Find<'_, D> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, token: S) {
-        let Self { lists, near, movers, support } = self;
+        let Self { lists, near, x, support } = self;
         near.clear(lists.count, lists.block);
         // A little more, lest the f32 of mixed precision miss any: there the kernel is zero all the same.
         let support2 = Doubles::all(token, support * support * (1.0 + 1e-5));
         match lists.block / Doubles::<S>::LANES {
-            1 => find::<D, S, 1>(token, lists, near, movers, support2),
-            2 => find::<D, S, 2>(token, lists, near, movers, support2),
-            _ => find::<D, S, 4>(token, lists, near, movers, support2),
+            1 => find::<D, S, 1>(token, lists, near, x, support2),
+            2 => find::<D, S, 2>(token, lists, near, x, support2),
+            _ => find::<D, S, 4>(token, lists, near, x, support2),
         }
     }
 }
@@ -150,7 +150,7 @@ fn find<const D: usize, S: Simd, const R: usize>(
     token: S,
     lists: &Lists,
     near: &mut Lists,
-    movers: &[Mover<D, f64>],
+    x: &[Vector<D>],
     support2: Doubles<S>,
 ) {
     for (block, candidates) in lists.blocks() {
@@ -158,7 +158,7 @@ fn find<const D: usize, S: Simd, const R: usize>(
         let mut own: [Vector<D, Doubles<S>>; R] = [Vector::from_parts(|_| support2); R];
         for (r, own) in own.iter_mut().enumerate() {
             let first = block.start + r * Doubles::<S>::LANES;
-            *own = Vector::from_parts(|a| Doubles::each(token, |k| movers[(first + k).min(last)].place.0[a]));
+            *own = Vector::from_parts(|a| Doubles::each(token, |k| x[(first + k).min(last)].0[a]));
         }
         // Room for all: what is too far is written over by the next one, without a branch.
         let mut end = near.candidates.len();
@@ -166,9 +166,9 @@ fn find<const D: usize, S: Simd, const R: usize>(
         let found = &mut near.candidates[..];
         for (n, &j) in candidates.iter().enumerate() {
             if let Some(&ahead) = candidates.get(n + AHEAD) {
-                prefetch(&movers[ahead as usize]);
+                prefetch(&x[ahead as usize]);
             }
-            let place = &movers[j as usize].place;
+            let place = &x[j as usize];
             let place = Vector::from_parts(|a| Doubles::all(token, place.0[a]));
             let mut within = false;
             for r in 0..R {

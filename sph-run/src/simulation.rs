@@ -210,7 +210,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
             self.walls.fill_motion::<D, N, P::Space, P::Kernel>(p, &self.neighbors, pairs);
             self.neighbors.refresh_from::<N, P::Kernel>(p.mirror, p, pairs);
         }
-        self.neighbors.find(pairs);
+        self.neighbors.find(&self.particles.x, pairs);
     }
 
     /// Brings everything around the owned particles up to date, in the one order that is right: halo, then images of
