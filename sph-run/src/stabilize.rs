@@ -5,6 +5,7 @@
 
 use crate::algebra::{Matrix, Sym, Vector};
 use crate::material::Material as _;
+use crate::phases::Phase;
 use crate::physics::Physics;
 use crate::rates::correction::{Among, correction};
 use crate::rates::{artificial_stress, diffusion, shifting, viscosity};
@@ -136,6 +137,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
     /// Adds what the law and the scene ask for to the accelerations and the heat of stress and artificial viscosity.
     pub fn accelerate_further(&mut self, acceleration: &mut [Vector<D>]) {
+        let before = self.watch.enter(Phase::Stabilisers);
         let (p, neighbors, pairs) = (&self.particles, &self.neighbors, self.parameters.pairs);
         let Stabilisers { artificial_stress: epsilon, impact, .. } = self.parameters.stabilisers;
         let Buffers { heat, opposing, .. } = &mut self.buffers;
@@ -155,6 +157,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
                 acceleration,
             );
         }
+        self.watch.enter(before);
     }
 
     /// Shifts particles inside the body, where the scene asks for it. Last of a step: what follows sees them at their new
