@@ -1,6 +1,8 @@
 //! `bench`: what costs how much, measured so that anyone can repeat it.
 
+mod callgrind;
 mod checkpoint;
+mod instructions;
 mod launches;
 mod page;
 mod peak;
@@ -28,6 +30,11 @@ pub enum Bench {
         #[command(flatten)]
         options: speed::Options,
     },
+    /// Instructions of a particle-step, beside earlier figures: for small changes, which times do not show.
+    Instructions {
+        #[command(flatten)]
+        options: instructions::Options,
+    },
 }
 
 /// Measures, and writes the table into tests/bench.
@@ -35,6 +42,7 @@ pub fn carry_out(bench: &Bench) -> Result<(), Failure> {
     let page = match bench {
         Bench::Checkpoint { particles, ranks } => checkpoint::measure(*particles, ranks)?,
         Bench::Speed { options } => speed::measure(options)?,
+        Bench::Instructions { options } => instructions::measure(options)?,
     };
     println!("{}", paths::short(&page).display());
     Ok(())

@@ -41,6 +41,14 @@ impl Heading {
         format!("By `{command}`, {day}, commit {commit}, {processor}, {cores} cores (load average before: {load}).")
     }
 
+    /// One for tests.
+    #[cfg(test)]
+    pub fn example() -> Self {
+        let [command, day, commit, processor, load] =
+            ["./talus bench speed", "2026-01-31", "abc", "A processor", "0.10"].map(str::to_owned);
+        Self { command, day, commit, processor, cores: 2, load }
+    }
+
     /// The day, and what was measured: cells of a table.
     pub fn cells(&self) -> String {
         format!("{} | {}", self.day, self.commit)
@@ -191,12 +199,6 @@ mod tests {
     use super::super::rows::ROWS;
     use super::*;
 
-    fn heading() -> Heading {
-        let [command, day, commit, processor, load] =
-            ["./talus bench speed", "2026-01-31", "abc", "A processor", "0.10"].map(str::to_owned);
-        Heading { command, day, commit, processor, cores: 2, load }
-    }
-
     /// Rows of tables have as many cells as their heads.
     fn is_even(page: &str) -> bool {
         let mut width = None;
@@ -214,7 +216,7 @@ mod tests {
         let one = || vec![launch(0.1, 1)];
         let copies = || vec![[launch(0.125, 1), launch(0.125, 1)]];
         let rows = [0, 5].map(|row| Measured { row: ROWS[row], one: one(), copies: copies(), two: two() });
-        let page = speed(&heading(), &rows, 0.89e9, false);
+        let page = speed(&Heading::example(), &rows, 0.89e9, false);
         assert!(is_even(&page), "{page}");
         for text in [
             "By `./talus bench speed`, 2026-01-31, commit abc, A processor, 2 cores (load average before: 0.10).",
@@ -234,7 +236,7 @@ mod tests {
     #[test]
     fn one_core_and_other_rows_leave_tables_out() {
         let rows = [Measured { row: ROWS[5], one: vec![launch(0.1, 1)], copies: vec![], two: vec![] }];
-        let page = speed(&heading(), &rows, 1e9, true);
+        let page = speed(&Heading::example(), &rows, 1e9, true);
         assert!(is_even(&page) && page.contains("| 0.100 (0.100 - 0.100) | - | - | - | - |"), "{page}");
         assert!(page.contains("mean nothing"), "{page}");
         assert!(!page.contains("two ranks |") && !page.contains("Beside other programs"), "{page}");
