@@ -45,13 +45,13 @@ pub fn parse(text: &str) -> Option<Counts> {
             named(name, &mut names)?;
         } else if line.starts_with("calls=") {
             is_of_a_call = true;
-        } else if line.starts_with(|c: char| c.is_ascii_digit() || "+-*".contains(c)) {
-            if !std::mem::take(&mut is_of_a_call) {
-                let count: u64 = line.split(' ').nth(1)?.parse().ok()?;
-                // Levels of a recursion are functions of their own there: name'2.
-                let name = function.split('\'').next().unwrap_or(function);
-                *counts.functions.entry(name.to_owned()).or_default() += count;
-            }
+        } else if line.starts_with(|c: char| c.is_ascii_digit() || "+-*".contains(c))
+            && !std::mem::take(&mut is_of_a_call)
+        {
+            let count: u64 = line.split(' ').nth(1)?.parse().ok()?;
+            // Levels of a recursion are functions of their own there: name'2.
+            let name = function.split('\'').next().unwrap_or(function);
+            *counts.functions.entry(name.to_owned()).or_default() += count;
         }
     }
     Some(counts)

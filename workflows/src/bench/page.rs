@@ -14,6 +14,8 @@ pub struct Heading {
     command: String,
     day: String,
     commit: String,
+    /// Are there changes that are not committed?
+    changed: bool,
     processor: String,
     cores: u32,
     load: String,
@@ -23,12 +25,12 @@ impl Heading {
     /// Of a benchmark that begins now, by these words behind `./talus bench`.
     pub fn now(words: &str) -> Result<Self, Failure> {
         let sources = record::Sources::now()?;
-        let changed = if sources.changed { ", with changes that are not committed" } else { "" };
         let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
         Ok(Self {
             command: format!("./talus bench {words}"),
             day: provenance::now()[..10].to_owned(),
-            commit: format!("{}{changed}", sources.commit),
+            commit: sources.commit,
+            changed: sources.changed,
             processor: processor(),
             cores: launch::cores(),
             load: load.split(' ').next().unwrap_or_default().to_owned(),
@@ -37,8 +39,11 @@ impl Heading {
 
     /// `By ..., 2026-01-31, commit ..., a processor, 2 cores (load average before: 0.10).`
     pub fn text(&self) -> String {
-        let Self { command, day, commit, processor, cores, load } = self;
-        format!("By `{command}`, {day}, commit {commit}, {processor}, {cores} cores (load average before: {load}).")
+        let Self { command, day, commit, processor, cores, load, .. } = self;
+        let changed = if self.changed { ", with changes that are not committed" } else { "" };
+        format!(
+            "By `{command}`, {day}, commit {commit}{changed}, {processor}, {cores} cores (load average before: {load})."
+        )
     }
 
     /// One for tests.
@@ -46,12 +51,12 @@ impl Heading {
     pub fn example() -> Self {
         let [command, day, commit, processor, load] =
             ["./talus bench speed", "2026-01-31", "abc", "A processor", "0.10"].map(str::to_owned);
-        Self { command, day, commit, processor, cores: 2, load }
+        Self { command, day, commit, changed: false, processor, cores: 2, load }
     }
 
-    /// The day, and what was measured: cells of a table.
+    /// The day, and the commit, with a plus where it was changed: cells of a table.
     pub fn cells(&self) -> String {
-        format!("{} | {}", self.day, self.commit)
+        format!("{} | {}{}", self.day, self.commit, if self.changed { "+" } else { "" })
     }
 }
 
