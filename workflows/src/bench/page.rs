@@ -163,7 +163,7 @@ pub fn speed(heading: &Heading, rows: &[Measured], peak: f64, quick: bool) -> St
     }
     let _ = write!(
         text,
-        "\n{COLUMNS}\n\n## Where the time goes\n\nPercent of the steps' time, medians; on two ranks means of both.\n"
+        "\n{COLUMNS}\n\n## Where the time goes\n\nPercent of the steps' time, in the launch of the middle rate; on two ranks means of both.\n"
     );
     phases(&mut text, "one rank", rows.iter().map(|row| (row.row.name, row.one.as_slice())));
     phases(&mut text, "two ranks", rows.iter().map(|row| (row.row.name, row.two.as_slice())));
@@ -179,13 +179,18 @@ fn phases<'a>(text: &mut String, title: &str, rows: impl Iterator<Item = (&'a st
     let names = launches[0].phases();
     let _ = write!(text, "\n| {title} | {} |\n|---|{}\n", names.join(" | "), "---|".repeat(names.len()));
     for (row, launches) in &rows {
-        let share = |name: &&str| {
-            let shares = launches.iter().map(|launch| 100.0 * launch.of(name) / launch.seconds());
-            format!("{:.1}", spread(shares).median)
-        };
+        let launch = middle(launches);
+        let share = |name: &&str| format!("{:.1}", 100.0 * launch.of(name) / launch.seconds());
         let shares: Vec<String> = names.iter().map(share).collect();
         let _ = writeln!(text, "| {row} | {} |", shares.join(" | "));
     }
+}
+
+/// The launch of the middle rate: its shares add up, which medians of each would not.
+fn middle(launches: &[Launch]) -> &Launch {
+    let mut sorted: Vec<&Launch> = launches.iter().collect();
+    sorted.sort_by(|a, b| a.rate().total_cmp(&b.rate()));
+    sorted[sorted.len() / 2]
 }
 
 fn peers(text: &mut String, main: f64) {
@@ -236,6 +241,12 @@ mod tests {
         ] {
             assert!(page.contains(text), "{text}\n{page}");
         }
+    }
+
+    #[test]
+    fn shares_are_those_of_the_middle_launch() {
+        let launches = [0.3, 0.1, 0.2].map(|seconds| launch(seconds, 1));
+        assert_eq!(middle(&launches), &launches[2]);
     }
 
     #[test]
