@@ -19,6 +19,7 @@ pub mod output;
 pub mod pace;
 pub mod parallel;
 pub mod particles;
+pub mod phases;
 pub mod physics;
 pub mod progress;
 pub mod rates;

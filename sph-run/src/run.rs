@@ -10,6 +10,7 @@ use crate::pace::Pace;
 use crate::parallel::Reduce;
 use crate::parallel::agree::agree;
 use crate::particles::Particles;
+use crate::phases::{self, Phase, Stopwatch};
 use crate::physics::Physics;
 use crate::progress::Progress;
 use crate::report::Scales;
@@ -111,6 +112,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             return self.finish();
         }
         self.note(if self.job.start.fresh() { "start" } else { "resume" }, "");
+        self.simulation.watch = Stopwatch::start();
         let mut over = self.outputs_due()?;
         agree(self.job.comm, || {
             self.check_wall_limit()?;
@@ -123,6 +125,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         })?;
         while !over {
             let begun = Instant::now();
+            self.simulation.watch.enter(Phase::Motion);
             if self.job.cli.stop_after_steps.is_some_and(|n| self.simulation.clock.step >= first + n) {
                 return self.stop(Reason::Steps);
             }
@@ -140,6 +143,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             }
             self.simulation.step(&plan);
             self.pace.stepped(begun.elapsed());
+            self.simulation.watch.enter(Phase::Output);
             over = self.outputs_due()?;
             self.progress.tell(&self.simulation.clock);
             self.report_progress(false);
@@ -152,6 +156,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
     fn finish(&mut self) -> Result<Outcome, RunError> {
         self.progress.finish();
         self.report_progress(true);
+        self.log_phases();
         let (folder, comm) = (self.job.folder, self.job.comm);
         agree(comm, || Ok(disk::write_atomic(&folder.done(), b"the run reached its end\n")?))?;
         self.note("done", "");
@@ -175,6 +180,17 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             let report = self.progress.report(&self.simulation.clock, ranks);
             let (job_id, deadline) = (job.deadline.job.clone(), job.deadline.text());
             let _ = journal::Progress { job: job_id, deadline, ..report }.write(job.folder);
+        }
+    }
+
+    /// Notes what the parts of the steps took, where there were any. Collective.
+    fn log_phases(&mut self) {
+        let first = self.job.start.clock.step;
+        if self.simulation.clock.step > first {
+            let line = self.simulation.phases_line(first);
+            if self.job.lock.is_some() {
+                phases::log(self.job.folder, &line);
+            }
         }
     }
 
@@ -296,6 +312,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
     /// Writes a checkpoint; `over`: of a run that has reached its end. Collective.
     fn checkpoint(&mut self, over: bool) -> Result<(), RunError> {
         let begun = Instant::now();
+        self.simulation.watch.enter(Phase::Output);
         let job = &self.job;
         let outputs = self.outputs.as_ref().map(Outputs::now);
         let still_ours = || {
@@ -327,6 +344,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         self.checkpoint(false)?;
         self.progress.finish();
         self.report_progress(true);
+        self.log_phases();
         let (folder, clock) = (self.job.folder, self.simulation.clock);
         agree(self.job.comm, || {
             // The request is honoured once.

@@ -13,6 +13,7 @@ use crate::parallel::migrate;
 use crate::parallel::orb::Tree;
 use crate::parallel::{Reduce, changed};
 use crate::particles::Particles;
+use crate::phases::{Phase, Stopwatch};
 use crate::physics::Physics;
 use crate::rates::momentum::Viscosity;
 use crate::space::Space;
@@ -92,6 +93,7 @@ pub struct Simulation<'a, const D: usize, const N: usize, P: Physics<D, N>> {
     pub x_build: Vec<Vector<D>>,
     pub gradient: Vec<Matrix<D>>,
     pub buffers: Buffers<D, N>,
+    pub watch: Stopwatch,
     /// Share the particles out anew at every build of the lists: for tests.
     pub always_rebalance: bool,
 }
@@ -151,6 +153,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
             x_build: Vec::new(),
             gradient: Vec::new(),
             buffers: Buffers::default(),
+            watch: Stopwatch::start(),
             always_rebalance: false,
         };
         simulation.settle();
@@ -204,20 +207,26 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
 
     /// Velocities of wall particles, from the material around them; then sweeps can begin.
     fn reflect_motion(&mut self) {
+        let before = self.watch.enter(Phase::Support);
         let (p, pairs) = (&mut self.particles, self.parameters.pairs);
         self.neighbors.refresh::<N, P::Kernel>(p, pairs);
         if self.walls.has_sites() {
+            self.watch.enter(Phase::Walls);
             self.walls.fill_motion::<D, N, P::Space, P::Kernel>(p, &self.neighbors, pairs);
+            self.watch.enter(Phase::Support);
             self.neighbors.refresh_from::<N, P::Kernel>(p.mirror, p, pairs);
         }
         self.neighbors.find(&self.particles.x, pairs);
+        self.watch.enter(before);
     }
 
     /// Brings everything around the owned particles up to date, in the one order that is right: halo, then images of
     /// owned and halo, then walls, which see all three.
     pub fn fill(&mut self, fields: Fields) {
+        let before = self.watch.enter(Phase::Halo);
         let p = &mut self.particles;
         self.partition.halo.fill(self.comm, p, fields);
+        self.watch.enter(Phase::Walls);
         self.mirrors.fill(p, fields);
         match fields {
             Fields::Motion => self.reflect_motion(),
@@ -225,11 +234,14 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
                 self.walls.fill_stress::<D, N, P::Space, P::Kernel>(p, &self.neighbors, self.parameters.pairs);
             }
         }
+        self.watch.enter(before);
     }
 
     /// Gives a field that only owned particles have to all copies and images of them, and zero to wall particles.
     pub fn spread<T: Spread<D, N>>(&mut self, field: &mut Vec<T>) {
+        let before = self.watch.enter(Phase::Halo);
         self.partition.halo.spread(self.comm, &self.particles, field);
+        self.watch.enter(before);
         self.mirrors.spread(&self.particles, field);
     }
 

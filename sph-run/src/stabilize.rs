@@ -6,6 +6,7 @@
 use crate::algebra::{Matrix, Sym, Vector};
 use crate::boundary::wall::extend;
 use crate::material::Material as _;
+use crate::phases::Phase;
 use crate::physics::Physics;
 use crate::rates::correction::{Among, correction};
 use crate::rates::momentum::Stressed;
@@ -159,6 +160,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
     /// Adds what the law and the scene ask for to the accelerations and the heat of stress and artificial viscosity.
     pub fn accelerate_further(&mut self, acceleration: &mut [Vector<D>]) {
+<<<<<<< HEAD
         let stabilisers = &self.parameters.stabilisers;
         if self.material.pair_viscosity().is_none() && stabilisers.impact == 0.0 && stabilisers.artificial_stress == 0.0
         {
@@ -166,6 +168,9 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         }
         // Volumes have changed with the densities.
         self.neighbors.refresh::<N, P::Kernel>(&self.particles, self.parameters.pairs);
+=======
+        let before = self.watch.enter(Phase::Stabilisers);
+>>>>>>> bench
         let (p, neighbors, pairs) = (&self.particles, &self.neighbors, self.parameters.pairs);
         let Stabilisers { artificial_stress: epsilon, impact, .. } = self.parameters.stabilisers;
         let Buffers { heat, opposing, .. } = &mut self.buffers;
@@ -185,6 +190,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
                 acceleration,
             );
         }
+        self.watch.enter(before);
     }
 
     /// Shifts particles inside the body, where the scene asks for it. Last of a step: what follows sees them at their new

@@ -6,6 +6,7 @@ use crate::algebra::Vector;
 use crate::lanes::{Element, Parts};
 use crate::material::{Increment, Material, gated};
 use crate::parallel::halo::Fields;
+use crate::phases::Phase;
 use crate::physics::Physics;
 use crate::rates::{
     momentum::{Stressed, Traction, momentum},
@@ -28,9 +29,11 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Advances by the planned step. Collective.
     pub fn step(&mut self, plan: &Plan) {
         let dt = plan.time_step;
+        self.watch.enter(Phase::Motion);
         self.kick(0.5 * dt);
         self.drift(dt);
         if plan.lists_go_stale {
+            self.watch.enter(Phase::Lists);
             self.rebuild();
         } else {
             self.refresh_volumes();
@@ -40,14 +43,20 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             // New copies have none yet; and what crossed a plane of symmetry turned its own around.
             self.fill(Fields::Stress);
         }
+        self.watch.enter(Phase::Stabilisers);
         self.refresh_correction();
         self.diffuse();
+        self.watch.enter(Phase::Gradient);
         self.update_stress(dt);
         self.fill(Fields::Stress);
+        self.watch.enter(Phase::Stabilisers);
         self.fill_viscosity();
+        self.watch.enter(Phase::Acceleration);
         self.accelerate();
         self.heat(dt);
+        self.watch.enter(Phase::Motion);
         self.kick(0.5 * dt);
+        self.watch.enter(Phase::Stabilisers);
         self.shift(dt);
         self.clock.time = plan.time;
         self.clock.time_step = dt;
@@ -81,6 +90,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             Precision::Mixed => velocity_gradient::<D, P::Kernel, f32>(&self.neighbors, pairs, &mut self.gradient),
         }
         self.correct_gradient();
+        self.watch.enter(Phase::Material);
         let p = &mut self.particles;
         let viscous = self.material.pair_viscosity().is_some();
         for (i, gradient) in self.gradient.iter().enumerate() {

@@ -10,6 +10,7 @@ mod momentum;
 mod mu_i;
 mod operators;
 mod orb;
+mod phases;
 mod resolution;
 mod stabilisers;
 mod stepping;

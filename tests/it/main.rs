@@ -1,6 +1,7 @@
 //! Tests of the programs as users run them, in one binary.
 
 mod bad_input;
+mod bench;
 mod pages;
 mod same_bits;
 mod tidy;

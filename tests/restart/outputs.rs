@@ -11,7 +11,7 @@ use std::fs;
 use std::io::Write;
 use tests::shim::{self, Fault};
 use tests::trial::{Trial, launch, short, state};
-use tests::{TIME_LIMIT, command, run, run_within};
+use tests::{TIME_LIMIT, WorkFolder, command, prepared, run, run_within};
 
 /// Times of the history, as a user reads them.
 fn times(folder: &RunFolder) -> Vec<f64> {
@@ -146,4 +146,32 @@ fn going_back_to_an_earlier_checkpoint() {
     assert!(index.segments.iter().all(|segment| segment.step <= 81) && !folder.snapshot(3).exists());
     trial.go(&folder, 3, &[], exit::DONE);
     trial.same(&folder);
+}
+
+#[test]
+fn every_launch_that_computes_leaves_a_line_of_its_phases() {
+    let work = WorkFolder::new();
+    let folder = prepared(&work, "run", short::PLANE, 1);
+    launch(&folder, 1, &["--stop-after-steps", "8"]).expect(exit::RESUMABLE);
+    launch(&folder, 2, &["--stop-after-steps", "0"]).expect(exit::RESUMABLE);
+    launch(&folder, 2, &["--stop-after-steps", "12"]).expect(exit::RESUMABLE);
+    let text = fs::read_to_string(folder.log().join("phases.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 3, "{text}");
+    let column = |name: &str| rows[0].iter().position(|cell| *cell == name).unwrap_or_else(|| panic!("{name}: {text}"));
+    let number = |row: usize, name: &str| -> f64 { rows[row][column(name)].parse().unwrap() };
+    for (row, ranks, step, steps) in [(1, 1.0, 8.0, 8.0), (2, 2.0, 20.0, 12.0)] {
+        let facts = ["ranks [1]", "step [1]", "steps [1]"].map(|name| number(row, name));
+        assert_eq!(facts, [ranks, step, steps], "{text}");
+        let whole = column("loop [s]");
+        let phases: f64 = rows[row][whole + 1..]
+            .iter()
+            .zip(&rows[0][whole + 1..])
+            .map(|(cell, name)| if name.ends_with(" [s]") { cell.parse::<f64>().unwrap() } else { 0.0 })
+            .sum();
+        assert!((phases - number(row, "loop [s]")).abs() < 1e-5 && phases > 0.0, "{text}");
+        // Its last act, the checkpoint, is one of the phases.
+        assert!(number(row, "output [s]") > 0.0 && number(row, "lists [s]") >= 0.0, "{text}");
+        assert!(number(row, "memory_sum [B]") >= ranks * 1e6, "{text}");
+    }
 }

@@ -1,10 +1,10 @@
 //! What a checkpoint costs, and a restart.
 
-use super::{Spread, folder};
+use super::{Spread, folder, processor, write};
 use crate::validate::record::Sources;
 use crate::{failure::Failure, launch, paths, stage};
 use formats::folder::RunFolder;
-use formats::{checkpoint, disk, provenance};
+use formats::{checkpoint, provenance};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -57,10 +57,7 @@ pub fn measure(particles: u64, ranks: &[u32]) -> Result<PathBuf, Failure> {
         processor(),
         launch::cores(),
     );
-    let page = folder().join("checkpoint.md");
-    std::fs::create_dir_all(folder()).map_err(|e| Failure::cannot_write(format!("{}: {e}", folder().display())))?;
-    disk::write_atomic(&page, text.as_bytes()).map_err(|e| Failure::cannot_write(e.to_string()))?;
-    Ok(page)
+    write(&folder().join("checkpoint.md"), &text)
 }
 
 struct Measured {
@@ -163,11 +160,4 @@ history = "1 s"
 "#,
         side * 0.01
     )
-}
-
-/// The processor's name.
-fn processor() -> String {
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let name = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
-    name.map_or_else(|| "unknown processor".into(), |(_, name)| name.trim().to_owned())
 }

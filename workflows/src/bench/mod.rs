@@ -1,9 +1,17 @@
 //! `bench`: what costs how much, measured so that anyone can repeat it.
 
+mod callgrind;
 mod checkpoint;
+mod instructions;
+mod launches;
+mod page;
+mod peak;
+mod rows;
+mod speed;
 
-use crate::{failure::Failure, paths};
-use std::path::PathBuf;
+use crate::{failure::Failure, paths, stage::Programs};
+use formats::disk;
+use std::path::{Path, PathBuf};
 
 /// What can be measured.
 #[derive(Debug, clap::Subcommand)]
@@ -17,12 +25,24 @@ pub enum Bench {
         #[arg(long, value_name = "N,..", value_delimiter = ',', default_values_t = [1, 2])]
         ranks: Vec<u32>,
     },
+    /// Steps of a table of scenes: rates on one core and on two, shares of the parts of a step, memory.
+    Speed {
+        #[command(flatten)]
+        options: speed::Options,
+    },
+    /// Instructions of a particle-step, beside earlier figures: for small changes, which times do not show.
+    Instructions {
+        #[command(flatten)]
+        options: instructions::Options,
+    },
 }
 
 /// Measures, and writes the table into tests/bench.
 pub fn carry_out(bench: &Bench) -> Result<(), Failure> {
     let page = match bench {
         Bench::Checkpoint { particles, ranks } => checkpoint::measure(*particles, ranks)?,
+        Bench::Speed { options } => speed::measure(options)?,
+        Bench::Instructions { options } => instructions::measure(options)?,
     };
     println!("{}", paths::short(&page).display());
     Ok(())
@@ -31,6 +51,29 @@ pub fn carry_out(bench: &Bench) -> Result<(), Failure> {
 /// Where the tables are kept.
 fn folder() -> PathBuf {
     paths::repository().join("tests").join("bench")
+}
+
+/// The programs that are measured: built now, or those in a folder.
+fn programs(folder: Option<&Path>) -> Result<Programs, Failure> {
+    match folder {
+        Some(folder) => Programs::installed(&paths::from_caller(folder)),
+        None => Programs::build(),
+    }
+}
+
+/// Writes a page, with the folders on the way to it. Returns its path.
+fn write(page: &Path, text: &str) -> Result<PathBuf, Failure> {
+    let folder = page.parent().unwrap_or(page);
+    std::fs::create_dir_all(folder).map_err(|e| Failure::cannot_write(format!("{}: {e}", folder.display())))?;
+    disk::write_atomic(page, text.as_bytes()).map_err(|e| Failure::cannot_write(e.to_string()))?;
+    Ok(page.to_owned())
+}
+
+/// The processor's name.
+fn processor() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    name.map_or_else(|| "unknown processor".into(), |(_, name)| name.trim().to_owned())
 }
 
 /// Least, middle and largest of some numbers.
