@@ -31,3 +31,4 @@ pub mod stabilize;
 pub mod step;
 pub mod sweep;
 pub mod timestep;
+pub mod trial;
