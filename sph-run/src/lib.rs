@@ -31,4 +31,3 @@ pub mod stabilize;
 pub mod step;
 pub mod sweep;
 pub mod timestep;
-pub mod trial;

@@ -57,8 +57,6 @@ pub struct Particles<const D: usize, const N: usize> {
     pub work: Vec<Work>,
     /// Index of the scene's body.
     pub body: Vec<u64>,
-    /// Trial.
-    pub past: Vec<crate::trial::Past<D, N>>,
 }
 
 /// Energy that left the motion of a particle, J/kg.
@@ -192,9 +190,6 @@ impl<const D: usize, const N: usize> Particles<D, N> {
         pick(&mut self.history, order);
         pick(&mut self.work, order);
         pick(&mut self.body, order);
-        if !self.past.is_empty() {
-            pick(&mut self.past, order);
-        }
         self.own(order.len());
     }
 }

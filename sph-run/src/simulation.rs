@@ -17,7 +17,6 @@ use crate::rates::momentum::Viscosity;
 use crate::space::Space;
 use crate::stabilize::{Buffers, Stabilisers};
 use crate::sweep::Pairs;
-use crate::trial::Scheme;
 use formats::h5::Communicator;
 use formats::scene::{Scene, WallLattice};
 
@@ -94,12 +93,6 @@ pub struct Simulation<'a, const D: usize, const N: usize, P: Physics<D, N>> {
     pub buffers: Buffers<D, N>,
     /// Share the particles out anew at every build of the lists: for tests.
     pub always_rebalance: bool,
-    /// Trial.
-    pub scheme: Scheme,
-    /// Trial: one sweep straight over the lists?
-    pub listed: bool,
-    /// Trial: viscosity from predicted velocities, with two sweeps.
-    pub predict_viscous: bool,
 }
 
 impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, P> {
@@ -158,13 +151,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
             gradient: Vec::new(),
             buffers: Buffers::default(),
             always_rebalance: false,
-            scheme: Scheme::asked(),
-            listed: std::env::var("TALUS_LISTED").is_ok(),
-            predict_viscous: std::env::var("TALUS_PREDICT").is_ok(),
         };
-        if let Ok(courant) = std::env::var("TALUS_COURANT") {
-            simulation.parameters.courant = courant.parse().expect("a number");
-        }
         simulation.settle();
         simulation.fill(Fields::Stress);
         simulation

@@ -13,15 +13,11 @@ use crate::rates::{
 use crate::simulation::Simulation;
 use crate::space::Space;
 use crate::timestep::Plan;
-use crate::trial::Scheme;
 
 impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Accelerations at the very start, of stress and artificial viscosity: viscosities between particles follow from the
     /// first strain. Collective.
     pub fn begin(&mut self) {
-        if self.scheme != Scheme::KickDriftKick {
-            return self.begin_trial();
-        }
         self.find_support();
         self.refresh_correction();
         self.accelerate();
@@ -29,11 +25,6 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
     /// Advances by the planned step. Collective.
     pub fn step(&mut self, plan: &Plan) {
-        match self.scheme {
-            Scheme::KickDriftKick => {}
-            Scheme::Staggered(gamma) => return self.step_staggered(plan, gamma),
-            Scheme::Verlet { every, lag } => return self.step_verlet(plan, every, lag),
-        }
         let dt = plan.time_step;
         self.kick(0.5 * dt);
         self.drift(dt);
@@ -53,19 +44,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.update_stress(dt);
         self.fill(Fields::Stress);
         self.fill_viscosity();
-        if self.predict_viscous {
-            // Trial: the viscosity from velocities predicted to the end of the step.
-            let p = &mut self.particles;
-            let half: Vec<_> = p.v[..p.owned].to_vec();
-            for i in 0..p.owned {
-                p.v[i] += p.a[i] * (0.5 * dt);
-            }
-            self.fill(Fields::Motion);
-            self.accelerate();
-            self.particles.v[..half.len()].copy_from_slice(&half);
-        } else {
-            self.accelerate();
-        }
+        self.accelerate();
         self.heat(dt);
         self.kick(0.5 * dt);
         self.shift(dt);
@@ -74,12 +53,12 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.clock.step += 1;
     }
 
-    pub(crate) fn find_support(&mut self) {
+    fn find_support(&mut self) {
         self.neighbors.find::<D, N, P::Kernel>(&self.particles, self.parameters.h);
     }
 
     /// v += a dt, damped implicitly.
-    pub(crate) fn kick(&mut self, dt: f64) {
+    fn kick(&mut self, dt: f64) {
         let p = &mut self.particles;
         let kept = 1.0 / (1.0 + self.parameters.damping * dt);
         for i in 0..p.owned {
@@ -88,7 +67,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     }
 
     /// x += v dt
-    pub(crate) fn drift(&mut self, dt: f64) {
+    fn drift(&mut self, dt: f64) {
         let p = &mut self.particles;
         for i in 0..p.owned {
             p.x[i] = p.x[i] + self.periods.rounded(p.v[i] * dt);
@@ -166,7 +145,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     }
 
     /// Counts the heat of the viscosity.
-    pub(crate) fn heat(&mut self, dt: f64) {
+    fn heat(&mut self, dt: f64) {
         for (work, power) in self.particles.work.iter_mut().zip(&self.buffers.heat) {
             work.viscous += power * dt;
         }

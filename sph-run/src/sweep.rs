@@ -114,28 +114,6 @@ pub fn around<const D: usize, const N: usize>(
     }
 }
 
-/// As [`around`], straight from a list.
-#[inline(always)]
-pub fn around_listed<const D: usize, const N: usize, K: Kernel>(
-    particles: &Particles<D, N>,
-    list: &[u32],
-    h: f64,
-    i: usize,
-    mut visit: impl FnMut(Pair<D>),
-) {
-    let scales = Scales::new::<D, K>(h);
-    let x = particles.x[i];
-    for &j in list {
-        let j = j as usize;
-        let d = x - particles.x[j];
-        let r2 = d.norm2();
-        if r2 < scales.support2 {
-            let slope = scales.slope * K::KIND.slope_over_q(r2.sqrt() * scales.per_h);
-            visit(Pair { j, d, slope });
-        }
-    }
-}
-
 /// Calls `visit` with the value of the kernel for every particle of `list` around particle `i`, 0 outside of the support.
 #[inline(always)]
 pub fn values<const D: usize, const N: usize, K: Kernel>(
