@@ -160,7 +160,6 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
     /// Adds what the law and the scene ask for to the accelerations and the heat of stress and artificial viscosity.
     pub fn accelerate_further(&mut self, acceleration: &mut [Vector<D>]) {
-<<<<<<< HEAD
         let stabilisers = &self.parameters.stabilisers;
         if self.material.pair_viscosity().is_none() && stabilisers.impact == 0.0 && stabilisers.artificial_stress == 0.0
         {
@@ -168,9 +167,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         }
         // Volumes have changed with the densities.
         self.neighbors.refresh::<N, P::Kernel>(&self.particles, self.parameters.pairs);
-=======
         let before = self.watch.enter(Phase::Stabilisers);
->>>>>>> bench
         let (p, neighbors, pairs) = (&self.particles, &self.neighbors, self.parameters.pairs);
         let Stabilisers { artificial_stress: epsilon, impact, .. } = self.parameters.stabilisers;
         let Buffers { heat, opposing, .. } = &mut self.buffers;
@@ -201,6 +198,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             return;
         }
         let (pairs, mut buffers) = (self.parameters.pairs, std::mem::take(&mut self.buffers));
+        self.neighbors.refresh::<N, P::Kernel>(&self.particles, pairs);
         let Buffers { surface, shift, .. } = &mut buffers;
         shifting::surface::<D, N, P::Kernel>(&self.particles, &self.neighbors, pairs, surface);
         self.spread(surface);
