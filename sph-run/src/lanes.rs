@@ -123,12 +123,10 @@ pub trait Lanes: Part + Debug {
     /// The number in a lane.
     fn lane(&self, k: usize) -> Self::Element;
     fn over(self, divisor: Self) -> Self;
-    /// 1/sqrt(x) within 3.5 %, for x that is neither zero nor subnormal. Root and division take as long as thirty
-    /// multiplications, and the estimates that processors offer differ between makers.
+    /// 1/sqrt(x) by f32, for x within its range and not zero.
     fn rough_inverse_root(self) -> Self;
-    /// Times which [`Lanes::closer_inverse_root`] takes the rough estimate to within two units in the last place.
-    const REFINEMENTS: usize;
-    /// 1/sqrt(x) from an estimate.
+    /// 1/sqrt(x) to within two units in the last place, from what f32 gives. Root and division in f64 take as long as thirty
+    /// multiplications, and the estimates that processors offer beside differ between makers.
     fn closer_inverse_root(self, estimate: Self) -> Self;
     fn least(self, other: Self) -> Self;
     fn largest(self, other: Self) -> Self;
@@ -142,36 +140,15 @@ pub trait Lanes: Part + Debug {
     }
 }
 
-/// (1 - e)^(-1/2) - 1 over e.
-const SERIES: [f64; 3] = [0.5, 0.375, 0.3125];
-
-/// A first estimate of 1/sqrt(x): halves the exponent and changes its sign, by arithmetic on the bits. Of an f64 the high
-/// word decides; what the same arithmetic makes of the low one is not seen.
-trait Estimate: Simd {
-    #[inline(always)]
-    fn estimate_f32s(self, x: Self::f32s) -> Self::f32s {
-        let half = self.wrapping_dyn_shr_u32s(self.transmute_u32s_f32s(x), self.splat_u32s(1));
-        self.transmute_f32s_u32s(self.sub_u32s(self.splat_u32s(0x5f37_5a86), half))
-    }
-
-    #[inline(always)]
-    fn estimate_f64s(self, x: Self::f64s) -> Self::f64s {
-        const MAGIC: u32 = 0x5fe6_eb50;
-        if Self::IS_SCALAR {
-            let bits: u64 = pulp::bytemuck::cast(x);
-            let word = |shift: u32| u64::from(MAGIC.wrapping_sub((bits >> shift) as u32 >> 1)) << shift;
-            pulp::bytemuck::cast(word(32) | word(0))
-        } else {
-            let half = self.wrapping_dyn_shr_u32s(pulp::bytemuck::cast(x), self.splat_u32s(1));
-            pulp::bytemuck::cast(self.sub_u32s(self.splat_u32s(MAGIC), half))
-        }
-    }
+/// 1/sqrt(x) in f32.
+#[inline(always)]
+fn estimate(x: f32) -> f32 {
+    1.0 / x.sqrt()
 }
-impl<S: Simd> Estimate for S {}
 
 macro_rules! lanes {
     ($name:ident, $element:ty, $lanes:ident, $count:ident, $splat:ident, $add:ident, $sub:ident, $mul:ident, $neg:ident,
-     $fma:ident, $div:ident, $min:ident, $max:ident, $less:ident, $first:ident, $estimate:ident, $terms:literal, $place:ty, $at:expr, $unit:expr, $movers:ident) => {
+     $fma:ident, $div:ident, $min:ident, $max:ident, $less:ident, $first:ident, $refined:literal, $place:ty, $at:expr, $unit:expr, $movers:ident) => {
         /// Lanes of the instructions S.
         #[derive(Clone, Copy, Debug)]
         pub struct $name<S: Simd>(S, S::$lanes);
@@ -236,19 +213,21 @@ macro_rules! lanes {
             }
             #[inline(always)]
             fn rough_inverse_root(self) -> Self {
-                Self(self.0, self.0.$estimate(self.1))
+                let mut lanes = self.1;
+                for x in pulp::bytemuck::cast_slice_mut::<_, $element>(std::slice::from_mut(&mut lanes)) {
+                    *x = <$element>::of(estimate(f32::of(x.wide())).wide());
+                }
+                Self(self.0, lanes)
             }
-            const REFINEMENTS: usize = 2;
             #[inline(always)]
             fn closer_inverse_root(self, y: Self) -> Self {
-                let number = |x: f64| Self(self.0, self.0.$splat(x as $element));
-                // y (1 + e/2 + 3/8 e^2 + 5/16 e^3 ..) with e = 1 - x y^2.
-                let e = (-(self * y)).multiply_add(y, number(1.0));
-                let mut series = number(SERIES[$terms - 1]);
-                for term in (0..$terms - 1).rev() {
-                    series = series.multiply_add(e, number(SERIES[term]));
+                if !$refined {
+                    return y;
                 }
-                (y * e).multiply_add(series, y)
+                // y (1 + e/2 + 3/8 e^2 + ..) with e = 1 - x y^2.
+                let number = |x: f64| Self(self.0, self.0.$splat(x as $element));
+                let e = (-(self * y)).multiply_add(y, number(1.0));
+                (y * e).multiply_add(number(0.375).multiply_add(e, number(0.5)), y)
             }
             #[inline(always)]
             fn least(self, other: Self) -> Self {
@@ -331,8 +310,7 @@ lanes!(
     max_f64s,
     less_than_f64s,
     first_true_m64s,
-    estimate_f64s,
-    3,
+    true,
     Vector<D>,
     |x: Vector<D>, _| x,
     |_| 1.0,
@@ -354,8 +332,7 @@ lanes!(
     max_f32s,
     less_than_f32s,
     first_true_m32s,
-    estimate_f32s,
-    2,
+    false,
     [Vector<D, f32>; 2],
     |x: Vector<D>, unit: f64| {
         let parts = x.0.map(|x| (x / unit, (x / unit * GRID).round() / GRID));

@@ -9,6 +9,7 @@ use mpi::traits::Communicator as _;
 use sph_run::cli::{self, Cli};
 use sph_run::deadline::Deadline;
 use sph_run::error::RunError;
+use sph_run::huge_pages::HugePages;
 use sph_run::limits::Limits;
 use sph_run::parallel::agree::{agree, share_text};
 use sph_run::resume::{Past, Start, read_scene};
@@ -18,6 +19,9 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
+
+#[global_allocator]
+static ALLOCATOR: HugePages = HugePages;
 
 fn main() {
     let begun = Instant::now();

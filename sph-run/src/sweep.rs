@@ -286,19 +286,16 @@ impl<'a, const D: usize, L: Lanes, K: Kernel, H: Fn(usize)> Near<'a, '_, D, L, K
             let r2 = self.difference(&self.movers[j as usize]).norm2().largest(self.scales.nearest2);
             let weighed = &mut *self.weighed;
             weighed.r2[n].0 = r2;
-            weighed.inverse[n].0 = r2.closer_inverse_root(r2.rough_inverse_root());
+            weighed.inverse[n].0 = r2.rough_inverse_root();
         }
         let Weighed { r2, inverse, slope, value } = &mut *self.weighed;
         let (scales, needs) = (self.scales, self.needs);
-        for _ in 1..L::REFINEMENTS {
-            for n in 0..some.len() {
-                inverse[n].0 = r2[n].0.closer_inverse_root(inverse[n].0);
-            }
-        }
         for n in 0..some.len() {
-            let r = r2[n].0 * inverse[n].0;
+            let closer = r2[n].0.closer_inverse_root(inverse[n].0);
+            inverse[n].0 = closer;
+            let r = r2[n].0 * closer;
             if needs.slope {
-                slope[n].0 = K::slope(r, inverse[n].0, scales);
+                slope[n].0 = K::slope(r, closer, scales);
             }
             if needs.value {
                 value[n].0 = K::value(r, scales);
