@@ -24,10 +24,15 @@ pub struct Lists {
 impl Lists {
     /// Each block, counted from the first particle that has a list, and its candidates.
     pub fn blocks(&self) -> impl Iterator<Item = (Range<usize>, &[u32])> {
-        self.starts.windows(2).enumerate().map(|(b, ends)| {
-            let particles = b * self.block..((b + 1) * self.block).min(self.count);
-            (particles, &self.candidates[ends[0] as usize..ends[1] as usize])
-        })
+        self.blocks_of(0..self.count)
+    }
+
+    /// The blocks of some particles, which begin one.
+    pub fn blocks_of(&self, part: Range<usize>) -> impl Iterator<Item = (Range<usize>, &[u32])> {
+        debug_assert!(part.start.is_multiple_of(self.block.max(1)));
+        part.clone()
+            .step_by(self.block.max(1))
+            .map(move |start| (start..(start + self.block).min(part.end), self.of(start)))
     }
 
     /// The candidates of a particle, itself among them if it is one of the range the lists are made from.
@@ -95,7 +100,12 @@ impl<const D: usize> Neighbors<D> {
 
     /// Sums over the pairs of the owned particles.
     pub fn sweep<K: Kernel, T: Element>(&self, pairs: Pairs, sums: &mut impl Sums<D, T>) {
-        let sweep = Sweep { movers: T::movers(self), lists: &self.near, first: 0 };
+        self.sweep_part::<K, T>(pairs, 0..self.near.len(), sums);
+    }
+
+    /// Sums over the pairs of some owned particles, in whole blocks.
+    pub fn sweep_part<K: Kernel, T: Element>(&self, pairs: Pairs, part: Range<usize>, sums: &mut impl Sums<D, T>) {
+        let sweep = Sweep { movers: T::movers(self), lists: &self.near, part, first: 0 };
         sweep.run::<K>(pairs.h / T::unit(pairs.h), pairs.instructions, sums);
     }
 

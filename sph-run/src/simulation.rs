@@ -91,6 +91,7 @@ pub struct Simulation<'a, const D: usize, const N: usize, P: Physics<D, N>> {
     pub walls: Walls,
     /// Positions when the neighbour lists were built.
     pub x_build: Vec<Vector<D>>,
+    /// Velocity gradients of some of the particles; kept for its memory only.
     pub gradient: Vec<Matrix<D>>,
     pub buffers: Buffers<D, N>,
     pub watch: Stopwatch,
@@ -186,7 +187,6 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         self.particles.arrange(&order);
         self.partition.planned.get_or_insert(self.particles.owned as u64);
         self.x_build.clone_from(&self.particles.x);
-        self.gradient.resize(self.particles.owned, Matrix::default());
 
         // A particle near a wall is needed twice as far: by the wall particles that others see.
         let beside_wall = if self.walls.has_sites() { 2.0 * reach } else { reach };

@@ -91,15 +91,6 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.buffers.correction = tensors;
     }
 
-    /// Velocity gradients, corrected: (grad v) L.
-    pub fn correct_gradient(&mut self) {
-        if self.parameters.stabilisers.gradient_correction {
-            for (gradient, correction) in self.gradient.iter_mut().zip(&self.buffers.correction) {
-                *gradient = gradient.product(correction);
-            }
-        }
-    }
-
     /// Rates of change of density and stress by diffusion. Collective.
     pub fn diffuse(&mut self) {
         let Stabilisers { density_diffusion, stress_diffusion, .. } = self.parameters.stabilisers;

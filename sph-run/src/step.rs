@@ -2,7 +2,7 @@
 //! so that stress and position are known at whole steps, velocity at halves: the staggered scheme of Yang et al. 2020,
 //! Eqs 33-39, without the lag of forces their text leaves open.
 
-use crate::algebra::Vector;
+use crate::algebra::{Matrix, Vector};
 use crate::lanes::{Element, Parts};
 use crate::material::{Increment, Material, gated};
 use crate::parallel::halo::Fields;
@@ -10,13 +10,17 @@ use crate::phases::Phase;
 use crate::physics::Physics;
 use crate::rates::{
     momentum::{Stressed, Traction, momentum},
-    velocity_gradient::velocity_gradient,
+    velocity_gradient::gradient_of_part,
 };
 use crate::simulation::Simulation;
 use crate::space::Space;
 use crate::stabilize::Buffers;
 use crate::sweep::{Precision, weight};
 use crate::timestep::Plan;
+use std::ops::Range;
+
+/// Particles whose velocity gradients are kept at a time: whole blocks, and few enough for a near cache.
+const PART: usize = 4096;
 
 impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// Accelerations at the very start, of stress and artificial viscosity: viscosities between particles follow from the
@@ -83,17 +87,35 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
     /// Density and stress of the owned particles, from the velocity gradient.
     fn update_stress(&mut self, dt: f64) {
-        let (spacing, gate) = (self.parameters.spacing, self.parameters.gate);
-        let pairs = self.parameters.pairs;
-        match pairs.precision {
-            Precision::Double => velocity_gradient::<D, P::Kernel, f64>(&self.neighbors, pairs, &mut self.gradient),
-            Precision::Mixed => velocity_gradient::<D, P::Kernel, f32>(&self.neighbors, pairs, &mut self.gradient),
+        let owned = self.particles.owned;
+        for first in (0..owned).step_by(PART) {
+            self.watch.enter(Phase::Gradient);
+            let part = first..(first + PART).min(owned);
+            let mut gradient = std::mem::take(&mut self.gradient);
+            gradient.resize(part.len(), Matrix::default());
+            let (neighbors, pairs) = (&self.neighbors, self.parameters.pairs);
+            match pairs.precision {
+                Precision::Double => gradient_of_part::<D, P::Kernel, f64>(neighbors, pairs, first, &mut gradient),
+                Precision::Mixed => gradient_of_part::<D, P::Kernel, f32>(neighbors, pairs, first, &mut gradient),
+            }
+            if self.parameters.stabilisers.gradient_correction {
+                for (gradient, correction) in gradient.iter_mut().zip(&self.buffers.correction[part.clone()]) {
+                    *gradient = gradient.product(correction);
+                }
+            }
+            self.watch.enter(Phase::Material);
+            self.strain(part, &gradient, dt);
+            self.gradient = gradient;
         }
-        self.correct_gradient();
-        self.watch.enter(Phase::Material);
+        self.refresh_volumes();
+    }
+
+    /// Density and stress of some owned particles under their velocity gradients.
+    fn strain(&mut self, part: Range<usize>, gradients: &[Matrix<D>], dt: f64) {
+        let (spacing, gate) = (self.parameters.spacing, self.parameters.gate);
         let p = &mut self.particles;
         let viscous = self.material.pair_viscosity().is_some();
-        for (i, gradient) in self.gradient.iter().enumerate() {
+        for (i, gradient) in part.zip(gradients) {
             // In the middle of the step, where the velocities are (Hughes & Winget 1980): dv/dx_mid = L (I - L dt/2)^-1, to
             // second order. At its end a rotation by omega dt would seem to dilate by (omega dt)^2/2 along each axis.
             let gradient = &gradient.with_square(0.5 * dt);
@@ -117,7 +139,6 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
                 p.viscosity[i] = self.material.viscosity(&step);
             }
         }
-        self.refresh_volumes();
     }
 
     /// Accelerations of the owned particles, from the stresses around them.

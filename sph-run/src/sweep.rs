@@ -11,6 +11,7 @@ use crate::physics::Kernel;
 pub use formats::scene::Precision;
 use pulp::{Simd, WithSimd};
 use std::marker::PhantomData;
+use std::ops::Range;
 
 /// What rates need to know beside the particles.
 #[derive(Clone, Copy, Debug)]
@@ -338,12 +339,14 @@ fn all<F: Parts<Number = L::Element>, L: Lanes>(token: L::Token, value: &F) -> F
 }
 
 /// Which particles to sum for, over which others.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Sweep<'a, const D: usize, T: Element> {
     /// All particles.
     pub movers: &'a [Mover<D, T>],
     /// Candidates of the blocks.
     pub lists: &'a Lists,
+    /// Which of the particles that have lists.
+    pub part: Range<usize>,
     /// Index of the first particle of the first block.
     pub first: usize,
 }
@@ -368,10 +371,10 @@ impl<const D: usize, T: Element, K: Kernel, Q: Sums<D, T>> WithSimd for Run<'_, 
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, token: S) {
-        let Sweep { movers, lists, first: start } = self.sweep;
+        let Sweep { movers, lists, part, first: start } = self.sweep;
         let scales = &self.scales.lanes::<T::Lanes<S>>(token);
         let weighed = &mut Weighed::new(scales.zero);
-        for (block, near) in lists.blocks() {
+        for (block, near) in lists.blocks_of(part) {
             let end = start + block.end;
             for first in (start + block.start..end).step_by(T::Lanes::<S>::LANES) {
                 let block = Block::<T::Lanes<S>> { token, first, last: end - 1 };

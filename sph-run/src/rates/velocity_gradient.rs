@@ -12,14 +12,26 @@ pub fn velocity_gradient<const D: usize, K: Kernel, T: Element>(
     pairs: Pairs,
     gradient: &mut [Matrix<D>],
 ) {
+    gradient_of_part::<D, K, T>(neighbors, pairs, 0, gradient);
+}
+
+/// As [`velocity_gradient`], of the particles from `first` on, which begins a block.
+pub fn gradient_of_part<const D: usize, K: Kernel, T: Element>(
+    neighbors: &Neighbors<D>,
+    pairs: Pairs,
+    first: usize,
+    gradient: &mut [Matrix<D>],
+) {
     let movers = T::movers(neighbors);
     let scale = 1.0 / T::unit(pairs.h);
-    neighbors.sweep::<K, T>(pairs, &mut VelocityGradient { movers, scale, gradient });
+    let part = first..first + gradient.len();
+    neighbors.sweep_part::<K, T>(pairs, part, &mut VelocityGradient { movers, scale, first, gradient });
 }
 
 struct VelocityGradient<'a, const D: usize, T: Element> {
     movers: &'a [Mover<D, T>],
     scale: f64,
+    first: usize,
     gradient: &'a mut [Matrix<D>],
 }
 
@@ -34,6 +46,6 @@ impl<const D: usize, T: Element> Sums<D, T> for VelocityGradient<'_, D, T> {
             let weight = block.same(pair.other.weight) * pair.slope;
             sum.add_outer((block.all(&pair.other.v) - v) * weight, pair.d);
         }
-        block.put(self.gradient, sum.times_number(block.number(self.scale)));
+        block.put_from(self.first, self.gradient, sum.times_number(block.number(self.scale)));
     }
 }

@@ -18,7 +18,8 @@ pub fn extrapolate<const D: usize, const N: usize, K: Kernel, F: Parts<Number = 
     at_walls.clear();
     at_walls.resize(particles.len() - particles.mirror, F::default());
     let first = particles.mirror;
-    let sweep = Sweep { movers: &neighbors.movers, lists: &neighbors.of_wall, first };
+    let (movers, lists) = (&neighbors.movers[..], &neighbors.of_wall);
+    let sweep = Sweep { movers, lists, part: 0..lists.len(), first };
     sweep.run::<K>(pairs.h, pairs.instructions, &mut Shepard { field, first, at_walls });
 }
 
