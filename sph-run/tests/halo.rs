@@ -173,7 +173,7 @@ impl Job for Check<'_> {
         let mut simulation = Simulation::<D, N, P>::new(self.comm, self.scene, material, mine, count, Clock::default());
         simulation.periods.wrap(&mut x);
         let name = |what: &str| format!("{:?}, {size} ranks, rank {rank}, {:?}: {what}", self.scene.space, self.start);
-        compare(&simulation, self.scene, &x, &name("at the start"));
+        compare(&simulation, self.scene, &x, Age::New, &name("at the start"));
 
         // Far, over several ranks' boxes; then as far as particles may go before lists are built again, each rank's
         // towards those of the next.
@@ -184,7 +184,7 @@ impl Job for Check<'_> {
             simulation.always_rebalance = round == 2;
             simulation.rebuild();
             simulation.periods.wrap(&mut x);
-            compare(&simulation, self.scene, &x, &name("after a migration"));
+            compare(&simulation, self.scene, &x, Age::New, &name("after a migration"));
 
             let (built, owners) = (x.clone(), owners(&simulation, x.len()));
             for axis in (0..3).filter(|&axis| P::Space::axis(axis).is_some()) {
@@ -195,7 +195,7 @@ impl Job for Check<'_> {
                 };
                 shift_all(&mut simulation, self.scene, &mut x, &built, go);
                 simulation.fill(Fields::Motion);
-                compare(&simulation, self.scene, &x, &name("with lists about to go stale"));
+                compare(&simulation, self.scene, &x, Age::Old, &name("with lists about to go stale"));
             }
         }
         let before = x.clone();
@@ -206,7 +206,7 @@ impl Job for Check<'_> {
         });
         simulation.rebuild();
         simulation.periods.wrap(&mut x);
-        compare(&simulation, self.scene, &x, &name("pressed together"));
+        compare(&simulation, self.scene, &x, Age::New, &name("pressed together"));
     }
 }
 
@@ -330,15 +330,26 @@ fn within<const D: usize>(all: &[(u64, Vector<D>)], x: Vector<D>, support: f64) 
     all.iter().filter(|(_, other)| (x - *other).norm2() < support * support).map(|(key, _)| *key).collect()
 }
 
+/// Of the lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Age {
+    /// Particles are where they were when lists were built: lists hold all within reach, the support and the skin.
+    New,
+    /// Particles have moved by as much as they may, half the skin: lists hold all within the support.
+    Old,
+}
+
 /// Compares what a rank has with what it should have. Collective.
 fn compare<const D: usize, const N: usize, P: Physics<D, N>>(
     simulation: &Simulation<D, N, P>,
     scene: &Scene,
     x: &[Vector<D>],
+    age: Age,
     name: &str,
 ) {
     let p = &simulation.particles;
-    let support = 2.0 * simulation.parameters.h;
+    let (support, skin) = (2.0 * simulation.parameters.h, simulation.parameters.skin);
+    let reach = if age == Age::New { support + skin } else { support };
     let material = everything::<D, N, P>(scene, x);
     let walls = all_sites::<D, N, P>(scene, &material);
 
@@ -372,18 +383,18 @@ fn compare<const D: usize, const N: usize, P: Physics<D, N>>(
     let walls: Vec<_> = walls.iter().filter(in_reach).copied().collect();
 
     let found = |x: Vector<D>, list: &[u32]| -> BTreeSet<u64> {
-        let keys: Vec<u64> = list.iter().map(|&j| p.key[j as usize]).collect();
-        assert!(keys.is_sorted_by(|a, b| a < b), "{name}: a list is not in ascending order");
-        let near = |&&j: &&u32| (x - p.x[j as usize]).norm2() < support * support;
+        let near = |&&j: &&u32| (x - p.x[j as usize]).norm2() < reach * reach;
         list.iter().filter(near).map(|&j| p.key[j as usize]).collect()
     };
     let (mut pairs_with_walls, mut needed_walls) = (0, BTreeSet::new());
+    assert_eq!(simulation.neighbors.of_owned.len(), p.owned);
     for i in 0..p.owned {
-        let mut wanted = within(&material, p.x[i], support);
-        wanted.remove(&p.key[i]);
+        // Itself among them.
+        let mut wanted = within(&material, p.x[i], reach);
+        assert!(wanted.contains(&p.key[i]));
         let near_walls = within(&walls, p.x[i], support);
         pairs_with_walls += near_walls.len();
-        wanted.extend(&near_walls);
+        wanted.extend(within(&walls, p.x[i], reach));
         needed_walls.extend(near_walls);
         let list = found(p.x[i], simulation.neighbors.of_owned.of(i));
         assert_eq!(list, wanted, "{name}: neighbours of particle {}", id(p.key[i]));
@@ -394,8 +405,31 @@ fn compare<const D: usize, const N: usize, P: Physics<D, N>>(
         let i = p.mirror + wall;
         if needed_walls.contains(&p.key[i]) {
             let list = found(p.x[i], simulation.neighbors.of_wall.of(wall));
-            assert_eq!(list, within(&material, p.x[i], support), "{name}: material around wall site {:x}", p.key[i]);
+            assert_eq!(list, within(&material, p.x[i], reach), "{name}: material around wall site {:x}", p.key[i]);
         }
+    }
+    // Lists are shared by blocks: in the order of sums, each particle of the block has the list, and what is in it was near
+    // one of them. From there each of the two may have moved by half the skin.
+    let furthest = (support + skin + if age == Age::New { 0.0 } else { skin }) * (1.0 + 1e-12);
+    for (lists, first, end) in
+        [(&simulation.neighbors.of_owned, 0, p.len()), (&simulation.neighbors.of_wall, p.mirror, p.mirror)]
+    {
+        let mut next = 0;
+        for (block, list) in lists.blocks() {
+            assert_eq!(block.start, next, "{name}: blocks follow each other");
+            next = block.end;
+            assert!(block.clone().all(|i| std::ptr::eq(lists.of(i), list)), "{name}: the list of {block:?}");
+            assert!(list.is_sorted_by_key(|&j| p.key[j as usize]), "{name}: a list is not in ascending order");
+            let others: BTreeSet<u32> = list.iter().copied().collect();
+            assert_eq!(others.len(), list.len(), "{name}: a particle is in a list twice");
+            for &j in list {
+                assert!((j as usize) < end, "{name}: a wall particle sees another");
+                let distance2 = |i: usize| (p.x[first + i] - p.x[j as usize]).norm2();
+                let nearest = block.clone().map(distance2).fold(f64::INFINITY, f64::min);
+                assert!(nearest < furthest * furthest, "{name}: {} from {block:?} is {j}", nearest.sqrt());
+            }
+        }
+        assert_eq!(next, lists.len(), "{name}: each particle has a list");
     }
     let mut seen = [pairs_with_walls as u64, (p.halo - p.owned) as u64, (p.mirror - p.halo) as u64];
     simulation.comm.sum(&mut seen);

@@ -4,6 +4,7 @@ mod boundaries;
 mod density_gate;
 mod dynamics;
 mod halo;
+mod lanes;
 mod lists;
 mod material;
 mod momentum;

@@ -1,16 +1,14 @@
 //! The pair operators on lattices and jittered blocks, against closed forms: rows C1-C5 and C8-C11 of the list of
 //! verification problems.
 
-use crate::support::block;
+use crate::support::{accelerate, block, neighbors, pairs};
 use formats::kernel::Kernel as Kind;
 use sph_run::algebra::{Matrix, Sym, Vector};
-use sph_run::neighbors::Neighbors;
 use sph_run::particles::Particles;
 use sph_run::physics::{CubicSpline, Kernel, WendlandC2};
-use sph_run::rates::momentum::{Viscosity, momentum};
+use sph_run::rates::momentum::Viscosity;
 use sph_run::rates::velocity_gradient::velocity_gradient;
 use sph_run::space::{Axisymmetric, PlaneStrain, Space, ThreeD};
-use sph_run::sweep::Pairs;
 
 struct Swept<const D: usize> {
     gradient: Vec<Matrix<D>>,
@@ -22,17 +20,13 @@ fn sweep_all<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
     h: f64,
     viscosity: f64,
 ) -> Swept<D> {
-    let mut neighbors = Neighbors::default();
-    neighbors.build(p, 2.1 * h);
-    neighbors.find::<D, N, K>(p, h);
-    let pairs = Pairs { h, spacing: 1.0 };
+    let pairs = pairs(h);
+    let neighbors = neighbors::<D, N, K>(p, 2.1 * h, pairs);
     let viscosity = Viscosity { strength: viscosity, below: 0.0 };
     let mut gradient = vec![Matrix::default(); p.owned];
-    velocity_gradient(p, &neighbors, &mut gradient);
-    let weighted: Vec<_> = p.stress.iter().zip(&p.x).map(|(&s, &x)| s * S::metric(x, 1.0)).collect();
-    let mut acceleration = vec![Vector::default(); p.owned];
-    let mut heat = vec![0.0; p.owned];
-    momentum::<D, N, S, _>(p, &neighbors, pairs, viscosity, &weighted, &mut acceleration, &mut heat);
+    velocity_gradient::<D, K, f64>(&neighbors, pairs, &mut gradient);
+    let weighted = |i: usize| p.stress[i] * S::metric(p.x[i], 1.0);
+    let (acceleration, _) = accelerate::<D, N, S, K, f64, _>(p, &neighbors, pairs, viscosity, weighted);
     Swept { gradient, acceleration }
 }
 
@@ -82,9 +76,10 @@ fn c2_c3_c4_lattice_sums() {
             p.v[i].0[0] = p.x[i].0[0];
             p.volume[i] = 1.0;
         }
-        let mut neighbors = Neighbors::default();
-        neighbors.build(&p, 2.0 * h);
-        assert_eq!(neighbors.of_owned.of(centre).len() + 1, count, "neighbours, self included");
+        let neighbors = neighbors::<D, N, K>(&p, 2.0 * h, pairs(h));
+        // The list serves the particles beside it as well.
+        let near = |&&j: &&u32| (p.x[centre] - p.x[j as usize]).norm2() < (2.0 * h).powi(2);
+        assert_eq!(neighbors.of_owned.of(centre).iter().filter(near).count(), count, "neighbours, self included");
         let w = |j: usize| K::KIND.norm(D) / h.powi(D as i32) * K::KIND.shape((p.x[centre] - p.x[j]).norm() / h);
         let sum: f64 = (0..p.owned).map(w).sum();
         assert!((sum - unity).abs() < 1e-6, "partition of unity {sum}");

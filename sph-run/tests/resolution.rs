@@ -1,12 +1,11 @@
 //! What operators and walls make of smooth fields: rows C6, C7 and C15 of the list of verification problems, and E2 under
 //! a load that grows slowly, which no scene can ask for.
 
-use crate::support::{Random, alone, block};
+use crate::support::{Random, alone, block, neighbors, pairs};
 use formats::scene::Scene;
 use formats::snapshot::Rows;
 use sph_run::algebra::{Matrix, Vector};
 use sph_run::dispatch::{Job, resolve};
-use sph_run::neighbors::Neighbors;
 use sph_run::parallel::halo::Fields;
 use sph_run::particles::Particles;
 use sph_run::physics::{CubicSpline, Kernel, Physics};
@@ -165,13 +164,12 @@ fn errors(side: usize, jitter: f64, h: f64) -> [f64; 4] {
         p.volume[i] = 1.0;
         p.v[i] = Vector([(k * (p.x[i].0[0] + 0.5 * p.x[i].0[1])).sin(), 0.0]);
     }
-    let mut neighbors = Neighbors::default();
-    neighbors.build(&p, 2.1 * h);
-    neighbors.find::<2, 4, CubicSpline>(&p, h);
+    let pairs = pairs(h);
+    let neighbors = neighbors::<2, 4, CubicSpline>(&p, 2.1 * h, pairs);
     let mut gradient = vec![Matrix::default(); p.owned];
-    velocity_gradient(&p, &neighbors, &mut gradient);
+    velocity_gradient::<2, CubicSpline, f64>(&neighbors, pairs, &mut gradient);
     let mut tensors = Vec::new();
-    correction(&p, &neighbors, Among::All, &mut tensors);
+    correction::<2, 4, CubicSpline>(&p, &neighbors, pairs, Among::All, &mut tensors);
     let (mut sums, mut counts) = ([0.0; 4], [0.0; 4]);
     for i in 0..p.owned {
         let x = p.x[i].0;

@@ -5,9 +5,14 @@
 
 use formats::h5::Communicator;
 use sph_run::algebra::{Sym, Vector};
+use sph_run::lanes::{Element, Instructions, Parts};
 use sph_run::material::{History, Increment, Material};
+use sph_run::neighbors::Neighbors;
 use sph_run::particles::{Particles, key};
+use sph_run::physics::Kernel;
+use sph_run::rates::momentum::{Stressed, Traction, Viscosity, momentum};
 use sph_run::space::Space;
+use sph_run::sweep::{Pairs, Precision, weight};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Numbers in [-1, 1), the same on every machine.
@@ -48,6 +53,47 @@ pub fn block<const D: usize, const N: usize, S: Space<D, N>>(side: usize, jitter
         p.volume[i] = S::volume(p.mass[i], p.density[i], p.x[i], 1.0);
     }
     p
+}
+
+/// Pairs of particles with spacing 1, in f64, by the best instructions there are.
+pub fn pairs(h: f64) -> Pairs {
+    Pairs { h, spacing: 1.0, instructions: Instructions::best(), precision: Precision::Double }
+}
+
+/// Neighbours of particles, ready for sweeps.
+pub fn neighbors<const D: usize, const N: usize, K: Kernel>(
+    p: &Particles<D, N>,
+    reach: f64,
+    pairs: Pairs,
+) -> Neighbors<D> {
+    let mut neighbors = Neighbors::default();
+    neighbors.build(p, reach, pairs);
+    neighbors.refresh::<N, K>(p, pairs);
+    neighbors.find(&p.x, pairs);
+    neighbors
+}
+
+/// Accelerations, and heat of the viscosity, by w sigma or w sigma L of each particle, in numbers T.
+pub fn accelerate<const D: usize, const N: usize, S, K, T, G>(
+    p: &Particles<D, N>,
+    neighbors: &Neighbors<D>,
+    pairs: Pairs,
+    viscosity: Viscosity,
+    weighted: impl Fn(usize) -> G,
+) -> (Vec<Vector<D>>, Vec<f64>)
+where
+    S: Space<D, N>,
+    K: Kernel,
+    T: Element,
+    G: Parts<Number = f64>,
+    G::With<T>: Traction<D, N, T>,
+{
+    let mut stressed: Vec<Stressed<G::With<T>, T>> = Vec::new();
+    let per_volume = weight::<D, K>(pairs.h, T::unit(pairs.h));
+    Stressed::all::<D, N, S, G>(p, pairs.spacing, per_volume, weighted, &mut stressed);
+    let (mut a, mut heat) = (vec![Vector::default(); p.owned], vec![0.0; p.owned]);
+    momentum::<D, N, S, K, _, T>(p, neighbors, pairs, viscosity, &stressed, &mut a, &mut heat);
+    (a, heat)
 }
 
 /// sqrt(J2)
