@@ -139,7 +139,9 @@ impl<const D: usize> WithSimd for Find<'_, D> {
         match lists.block / Doubles::<S>::LANES {
             1 => find::<D, S, 1>(token, lists, near, x, support2),
             2 => find::<D, S, 2>(token, lists, near, x, support2),
-            _ => find::<D, S, 4>(token, lists, near, x, support2),
+            4 => find::<D, S, 4>(token, lists, near, x, support2),
+            8 => find::<D, S, 8>(token, lists, near, x, support2),
+            registers => unreachable!("blocks of {registers} registers"),
         }
     }
 }

@@ -327,6 +327,7 @@ fn command_lines_of_the_run_with_a_fault() {
         &["run", "--fast"],
         &["run", "--stop-after-steps", "-3"],
         &["run", "--stop-after-steps", "many"],
+        &["run", "--instructions", "avx"],
         &["run", "--checkpoint-every", "0s"],
         &["run", "--checkpoint-every", "5 parsecs"],
     ];
