@@ -7,7 +7,7 @@ use formats::{
     kernel::Kernel,
     scene::{
         Body, Cone, DruckerPrager, End, Initial, InitialStress, Lattice, Material, MeanStress, Numerics, Output,
-        Rotation, Scene, Shape, Slip, Wall, WallKind,
+        Precision, Rotation, Scene, Shape, Slip, Wall, WallKind,
     },
     space::Space,
 };

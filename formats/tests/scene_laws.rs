@@ -4,8 +4,8 @@
 mod scenes;
 
 use formats::scene::{
-    Cone, Curve, DruckerPrager, Initial, InitialStress, Lattice, Material, MeanStress, MuI, Norm, Numerics, Rotation,
-    Scene, Unyielded, ViscoPlastic, ViscousOperator,
+    Cone, Curve, DruckerPrager, Initial, InitialStress, Lattice, Material, MeanStress, MuI, Norm, Numerics, Precision,
+    Rotation, Scene, Unyielded, ViscoPlastic, ViscousOperator,
 };
 use scenes::{bad, faults, good};
 
@@ -194,7 +194,8 @@ fn every_key_of_the_laws_is_read() {
 fn every_key_of_the_numerics_is_read() {
     let keys = "viscosity = 0.2\nviscosity-acts = \"always\"\nquadratic-viscosity = 2\ndamping = \"3 1/s\"\n\
                 damping-in-flow = \"forced\"\ndensity-gate = 0.9\ndensity-diffusion = 0.3\nstress-diffusion = 0.4\n\
-                artificial-stress = 0.5\ngradient-correction = \"variational\"\nshifting = 0.6\ncourant";
+                artificial-stress = 0.5\ngradient-correction = \"variational\"\nshifting = 0.6\n\
+                precision = \"mixed\"\ncourant";
     let expected = Numerics {
         courant: 0.5,
         viscous_courant: 0.125,
@@ -208,11 +209,11 @@ fn every_key_of_the_numerics_is_read() {
         artificial_stress: 0.5,
         gradient_correction: true,
         shifting: 0.6,
-        precision: Precision::Double,
+        precision: Precision::Mixed,
     };
     assert_eq!(good(SOIL, "courant", keys).numerics, expected);
     let keys = "viscous-courant = 0.2\nviscosity = 0.1\nviscosity-acts = \"approach\"\ndensity-diffusion = 0\n\
-                gradient-correction = \"none\"\ndamping-in-flow = \"refused\"\ncourant";
+                gradient-correction = \"none\"\ndamping-in-flow = \"refused\"\nprecision = \"f64\"\ncourant";
     let expected = Numerics { viscous_courant: 0.2, viscosity: 0.1, viscosity_on_approach: true, ..plain() };
     assert_eq!(good(FLUID, "courant", keys).numerics, expected);
     assert_eq!(good(GRAINS, "courant", keys).numerics, expected);
@@ -346,6 +347,8 @@ fn numerics_out_of_range_or_without_effect() {
     soil("viscosity-acts = \"never\"", (12, 18), "viscosity-acts", "valid: approach, always");
     soil("gradient-correction = true", (12, 23), "gradient-correction", "one of \"none\", \"variational\" is needed");
     soil("damping-in-flow = \"yes\"", (12, 19), "damping-in-flow", "valid: refused, forced");
+    soil("precision = \"f32\"", (12, 13), "precision", "valid: f64, mixed");
+    soil("precision = 64", (12, 13), "precision", "one of \"f64\", \"mixed\" is needed");
     soil(
         "viscous-courant = 0.1",
         (12, 19),

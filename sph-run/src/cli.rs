@@ -1,6 +1,7 @@
 //! The command line.
 
-use clap::Parser;
+use crate::lanes::Instructions;
+use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -62,6 +63,11 @@ pub struct Cli {
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u64).range(1..))]
     pub checkpoint_archive: Option<u64>,
 
+    /// Vector instructions for the sums over pairs: avx512, avx2 or portable; `auto`: the most that the processor has.
+    /// The results have the same bits with all of them.
+    #[arg(long, value_name = "SET", default_value = "auto")]
+    pub instructions: Wanted,
+
     /// Say nothing but errors.
     #[arg(long)]
     pub quiet: bool,
@@ -97,6 +103,43 @@ pub enum WallLimit {
     Auto,
     None,
     Of(Duration),
+}
+
+/// Which instructions a run is to use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// The most that the processor has.
+    Auto,
+    These(Instructions),
+}
+
+impl Wanted {
+    /// What this processor computes with; what is wrong where it lacks them.
+    pub fn here(self) -> Result<Instructions, String> {
+        match self {
+            Self::Auto => Ok(Instructions::best()),
+            Self::These(instructions) if instructions.are_there() => Ok(instructions),
+            Self::These(instructions) => {
+                let best = Instructions::best();
+                Err(format!(
+                    "--instructions: the processor has no {instructions}; it has {best}; auto takes what there is"
+                ))
+            }
+        }
+    }
+}
+
+impl std::str::FromStr for Wanted {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => Instructions::from_str(text, false)
+                .map(Self::These)
+                .map_err(|_| "expected auto, avx512, avx2 or portable".to_owned()),
+        }
+    }
 }
 
 impl std::str::FromStr for Cadence {
@@ -150,6 +193,30 @@ mod tests {
         for text in ["", "0s", "0steps", "5 parsecs", "1.5steps", "-3s", "10"] {
             assert!(text.parse::<Cadence>().is_err(), "{text}");
             assert!(text.parse::<WallLimit>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn instructions() {
+        for (text, wanted) in [
+            ("auto", Wanted::Auto),
+            ("avx512", Wanted::These(Instructions::Avx512)),
+            ("avx2", Wanted::These(Instructions::Avx2)),
+            ("portable", Wanted::These(Instructions::Portable)),
+        ] {
+            assert_eq!(text.parse(), Ok(wanted));
+            // Whatever the processor has: what is handed on is there, what is not is named.
+            match (wanted.here(), wanted) {
+                (Ok(chosen), Wanted::Auto) => assert_eq!(chosen, Instructions::best()),
+                (Ok(chosen), Wanted::These(these)) => assert!(chosen == these && these.are_there()),
+                (Err(message), Wanted::These(these)) => {
+                    assert!(!these.are_there() && message.contains(&these.to_string()), "{message}");
+                }
+                (Err(message), Wanted::Auto) => panic!("{message}"),
+            }
+        }
+        for text in ["", "AVX2", "neon", "avx"] {
+            assert!(text.parse::<Wanted>().is_err(), "{text}");
         }
     }
 }

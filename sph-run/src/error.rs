@@ -36,6 +36,8 @@ pub enum RunError {
     EndHasPassed { path: PathBuf, end: f64, time: f64 },
     #[error("{0}, or --wall-limit none")]
     LimitTooShort(String),
+    #[error("{0}")]
+    NoSuchInstructions(String),
     /// On a rank that learnt of rank 0's failure; rank 0 tells the user.
     #[error("rank 0 failed")]
     Elsewhere { code: i32 },
@@ -48,7 +50,11 @@ impl RunError {
     pub fn exit_code(&self) -> i32 {
         match self {
             Self::File(e) => e.exit_code(),
-            Self::Scene(_) | Self::HasBegun { .. } | Self::EndHasPassed { .. } | Self::LimitTooShort(_) => exit::USAGE,
+            Self::Scene(_)
+            | Self::HasBegun { .. }
+            | Self::EndHasPassed { .. }
+            | Self::LimitTooShort(_)
+            | Self::NoSuchInstructions(_) => exit::USAGE,
             Self::Numerical { .. } => exit::NUMERICAL,
             Self::Input { .. } => exit::NO_INPUT,
             Self::CannotWrite { .. } => exit::CANNOT_WRITE,

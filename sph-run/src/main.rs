@@ -6,15 +6,16 @@ use formats::h5::Communicator;
 use formats::scene::Scene;
 use formats::{exit, lock};
 use mpi::traits::Communicator as _;
-use sph_run::cli::{self, Cli};
+use sph_run::cli::{self, Cli, Wanted};
 use sph_run::deadline::Deadline;
 use sph_run::error::RunError;
 use sph_run::huge_pages::HugePages;
+use sph_run::lanes::Instructions;
 use sph_run::limits::Limits;
 use sph_run::parallel::agree::{agree, share_text};
 use sph_run::resume::{Past, Start, read_scene};
 use sph_run::run::{Outcome, Run};
-use sph_run::{check, dispatch, scheduler};
+use sph_run::{check, dispatch, parallel, scheduler};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc;
@@ -99,6 +100,21 @@ fn launch(comm: &Communicator, cli: &Cli, signalled: Arc<AtomicBool>, begun: Ins
     }
 }
 
+/// What this rank computes pairs with, where all ranks have what is asked for. Collective.
+fn instructions(comm: &Communicator, wanted: Wanted) -> Result<Instructions, RunError> {
+    let here = wanted.here().map_err(RunError::NoSuchInstructions);
+    let mut lacking = [u64::from(here.is_err())];
+    parallel::Reduce::sum(comm, &mut lacking);
+    match lacking {
+        [0] => here,
+        [ranks] => Err(here.err().unwrap_or_else(|| {
+            let message =
+                format!("--instructions: the processors of {ranks} ranks lack them; auto takes what there is");
+            RunError::NoSuchInstructions(message)
+        })),
+    }
+}
+
 fn run(
     comm: &Communicator,
     cli: &Cli,
@@ -106,6 +122,7 @@ fn run(
     limits: Limits,
     begun: Instant,
 ) -> Result<Outcome, RunError> {
+    let instructions = instructions(comm, cli.instructions)?;
     // Before the lock, whose folder need not be there.
     agree(comm, || read_scene(&folder.scene()))?;
     let lock = agree(comm, || {
@@ -134,7 +151,7 @@ fn run(
     let scene = Scene::read(&folder.scene().display().to_string(), &start.scene)?;
     let scene_hash = Scene::hash(&start.scene);
     let lock = lock.as_ref();
-    let run = Run { comm, cli, folder, scene: &scene, scene_hash, start, past, limits, deadline, lock };
+    let run = Run { comm, cli, folder, scene: &scene, scene_hash, start, past, limits, instructions, deadline, lock };
     let outcome = dispatch::resolve(&scene, run);
     if outcome.is_err() {
         // Whatever failed: to have lost the folder to another launch explains it, and has an exit code of its own.

@@ -4,6 +4,7 @@ use crate::cli::{Cadence, Cli};
 use crate::deadline::Deadline;
 use crate::dispatch::Job;
 use crate::error::{Fault, RunError};
+use crate::lanes::Instructions;
 use crate::limits::{Limits, Reason};
 use crate::output::Outputs;
 use crate::pace::Pace;
@@ -46,6 +47,8 @@ pub struct Run<'a> {
     pub scene_hash: String,
     pub start: Start,
     pub limits: Limits,
+    /// Of this rank's processor.
+    pub instructions: Instructions,
     /// What follows counts on rank 0 only.
     pub past: Past,
     pub deadline: Deadline,
@@ -71,8 +74,10 @@ impl Job for Run<'_> {
         let (_, rows) = snapshot::read_rows(&self.start.particles, snapshot::share(count, rank, size), self.comm)?;
         let particles = Particles::from_rows::<P::Space>(&rows);
         drop(rows);
+        let (comm, scene, clock) = (self.comm, self.scene, self.start.clock);
+        let instructions = self.instructions;
         let mut simulation =
-            Simulation::<D, N, P>::new(self.comm, self.scene, material, particles, count, self.start.clock);
+            Simulation::<D, N, P>::with_instructions(instructions, comm, scene, material, particles, count, clock);
         simulation.always_rebalance = self.cli.always_rebalance;
         if self.start.fresh() {
             simulation.begin();
@@ -82,12 +87,22 @@ impl Job for Run<'_> {
             self.lock.map_or(Ok(()), RunLock::still_ours)?;
             Outputs::open(self.folder, then, self.scene.space)
         })?;
+        if rank == 0 && !self.cli.quiet && !self.start.over {
+            eprintln!("sph-run: pairs in {}", self.numbers());
+        }
         let progress = Progress::new(self.cli.quiet || rank != 0, &simulation.clock, self.scene.end.time, count);
         let pace = Pace::new(self.past.write_seconds.map(Duration::from_secs_f64));
         let scales = Scales::new(self.scene);
         let (checkpointed, checkpoint_step) = (Instant::now(), simulation.clock.step);
         let course = Course { scales, job: self, simulation, outputs, progress, pace, checkpointed, checkpoint_step };
         course.follow()
+    }
+}
+
+impl Run<'_> {
+    /// What pairs are computed in, for people.
+    fn numbers(&self) -> String {
+        format!("{}, {} instructions", self.scene.numerics.precision, self.instructions)
     }
 }
 
@@ -111,7 +126,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         if self.job.start.over {
             return self.finish();
         }
-        self.note(if self.job.start.fresh() { "start" } else { "resume" }, "");
+        self.note(if self.job.start.fresh() { "start" } else { "resume" }, &format!("pairs in {}", self.job.numbers()));
         self.simulation.watch = Stopwatch::start();
         let mut over = self.outputs_due()?;
         agree(self.job.comm, || {

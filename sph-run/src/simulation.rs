@@ -105,6 +105,19 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         comm: &'a Communicator,
         scene: &Scene,
         material: P::Material,
+        particles: Particles<D, N>,
+        count: u64,
+        clock: Clock,
+    ) -> Self {
+        Self::with_instructions(Instructions::best(), comm, scene, material, particles, count, clock)
+    }
+
+    /// As [`Simulation::new`], computing pairs with these instructions.
+    pub fn with_instructions(
+        instructions: Instructions,
+        comm: &'a Communicator,
+        scene: &Scene,
+        material: P::Material,
         mut particles: Particles<D, N>,
         count: u64,
         clock: Clock,
@@ -138,7 +151,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
                 damping: numerics.damping,
                 gate: numerics.density_gate * scene.material.density(),
                 skin: SKIN * h,
-                pairs: Pairs { h, spacing: dx, instructions: Instructions::best(), precision: numerics.precision },
+                pairs: Pairs { h, spacing: dx, instructions, precision: numerics.precision },
                 viscosity,
                 stabilisers: Stabilisers::new(scene),
                 count,

@@ -23,7 +23,7 @@ fn there() -> Vec<Instructions> {
     all.into_iter().filter(|it| it.are_there()).collect()
 }
 
-/// 1/sqrt(x) as sweeps take it, after so many refinements.
+/// 1/sqrt(x) as sweeps take it, or before it is refined.
 struct Roots<'a, T> {
     x: &'a [T],
     refined: bool,
@@ -38,7 +38,7 @@ impl<T: Element> WithSimd for Roots<'_, T> {
         for some in self.x.chunks(T::Lanes::<S>::LANES) {
             let x = T::Lanes::<S>::each(token, |k| some[k.min(some.len() - 1)]);
             let mut y = x.rough_inverse_root();
-            for _ in 0..if self.refined { T::Lanes::<S>::REFINEMENTS } else { 0 } {
+            if self.refined {
                 y = x.closer_inverse_root(y);
             }
             roots.extend((0..some.len()).map(|k| y.lane(k)));
@@ -142,11 +142,9 @@ fn kernels_in_lanes() {
         let neighbors = neighbors::<3, 6, K>(&p, 4.0 * h, pairs);
         let mut record = Record(Vec::new());
         let (kind, h) = (K::KIND, h / T::unit(h));
-        Sweep { movers: T::movers(&neighbors), lists: &neighbors.of_owned, first: 0 }.run::<K>(
-            h,
-            instructions,
-            &mut record,
-        );
+        let (movers, lists) = (T::movers(&neighbors), &neighbors.of_owned);
+        let sweep = Sweep { movers, lists, part: 0..1, first: 0 };
+        sweep.run::<K>(h, instructions, &mut record);
         assert_eq!(record.0.len(), all.len());
         let (mut of_slope, mut of_value) = (0.0_f64, 0.0_f64);
         for (j, slope, value) in record.0 {

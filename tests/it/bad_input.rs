@@ -73,6 +73,7 @@ const SCENES: &[(&str, &str, &str)] = &[
     ("[end]", "[initial]\nseed = -1\n[end]", "seed"),
     ("[end]", "[numerics]\ncourant = 0\n[end]", "courant"),
     ("[end]", "[numerics]\nshifting = 2\n[end]", "shifting"),
+    ("[end]", "[numerics]\nprecision = \"f32\"\n[end]", "mixed"),
     ("[end]", "[initial]\nstress = \"pressure\"\npressure = \"-1 Pa\"\n[end]", "0 or greater"),
     ("[end]", "[output]\nsnapshots = \"2 ms\"\n[end]", "end.time"),
     // Unknown or missing.
@@ -326,6 +327,7 @@ fn command_lines_of_the_run_with_a_fault() {
         &["run", "--fast"],
         &["run", "--stop-after-steps", "-3"],
         &["run", "--stop-after-steps", "many"],
+        &["run", "--instructions", "avx"],
         &["run", "--checkpoint-every", "0s"],
         &["run", "--checkpoint-every", "5 parsecs"],
     ];

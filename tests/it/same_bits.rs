@@ -3,8 +3,8 @@
 
 use formats::{exit, folder::RunFolder};
 use std::fs;
-use tests::trial::{Trial, hash, outputs, processes, signal, state, while_running};
-use tests::{WorkFolder, prepared};
+use tests::trial::{Trial, hash, outputs, processes, short, signal, state, while_running};
+use tests::{WorkFolder, left_out, prepared};
 
 /// What the scenes share: soft ground, so that a few hundred steps see a flow.
 const SHARED: &str = r#"
@@ -250,6 +250,12 @@ fn scene(text: &str) -> String {
     format!("{text}{SHARED}")
 }
 
+/// The same with the pairs in f32.
+fn mixed(text: &str) -> String {
+    let key = "[numerics]\nprecision = \"mixed\"\n";
+    if text.contains("[numerics]\n") { text.replace("[numerics]\n", key) } else { format!("{text}{key}") }
+}
+
 /// On more ranks, from preparation on; on three of them with particles shared out anew at every build of the lists
 /// and checkpoints at odd moments.
 fn on_other_ranks(trial: &Trial, scene: &str) {
@@ -390,6 +396,61 @@ fn slab_of_mirrors_and_periods() {
     let trial = Trial::new(&text);
     on_three_ranks(&trial, &text);
     in_pieces(&trial);
+}
+
+/// Pairs in f32: with the plain operators and with the corrected ones.
+#[test]
+fn mixed_precision() {
+    for text in [scene(SOLID), scene(RINGS), STABILISED.to_owned()] {
+        let text = mixed(&text);
+        let trial = Trial::new(&text);
+        on_ranks(&trial, &text, 2, &[]);
+        on_three_ranks(&trial, &text);
+        in_pieces(&trial);
+    }
+}
+
+/// What the levels of `--instructions` ask of a processor.
+#[cfg(target_arch = "x86_64")]
+fn processor_has(level: &str) -> bool {
+    use std::arch::is_x86_feature_detected as has;
+    match level {
+        "avx512" => has!("avx512f") && has!("avx512bw") && has!("avx512cd") && has!("avx512dq") && has!("avx512vl"),
+        "avx2" => has!("avx2") && has!("fma"),
+        _ => true,
+    }
+}
+#[cfg(not(target_arch = "x86_64"))]
+fn processor_has(level: &str) -> bool {
+    level == "portable"
+}
+
+/// Lanes of 64 bytes, of 32, and one particle at a time; block by block in f64 and in f32.
+#[test]
+fn with_all_instructions() {
+    for text in [short::SOLID, short::RINGS] {
+        let answers = [text.to_owned(), mixed(text)].map(|text| {
+            let trial = Trial::in_memory(&text);
+            for level in ["avx512", "avx2", "portable"] {
+                for ranks in [1, 2] {
+                    let folder = trial.fresh(&format!("{level}-{ranks}"));
+                    let options = ["--instructions", level];
+                    if processor_has(level) {
+                        let said = trial.go(&folder, ranks, &options, exit::DONE);
+                        let name = ["AVX-512", "AVX2", "portable"].into_iter().find(|name| said.stderr.contains(name));
+                        assert_eq!(name.map(|name| name.replace('-', "").to_lowercase()).as_deref(), Some(level));
+                        trial.same(&folder);
+                    } else {
+                        let said = trial.go(&folder, ranks, &options, exit::USAGE);
+                        assert_eq!(said.stderr.matches("the processor has no").count(), 1, "{said}");
+                        left_out(&format!("the processor has no {level}"));
+                    }
+                }
+            }
+            tests::digests(&trial.reference).pop()
+        });
+        assert_ne!(answers[0], answers[1], "f32 is not f64");
+    }
 }
 
 /// By a signal to mpirun, by one to a single rank, by a file: exit code 75, and the same command goes on.

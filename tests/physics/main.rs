@@ -6,6 +6,7 @@ mod films;
 mod flows;
 mod fluids;
 mod impacts;
+mod precision;
 mod rest;
 mod slopes;
 mod stepping;

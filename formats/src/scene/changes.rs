@@ -375,6 +375,10 @@ density = "2.6 g/cm³"
         assert_eq!((error.faults[0].line, error.faults[0].column), (6, 11), "{error}");
         // Not the same number of seeds, though the same number as a float.
         assert_eq!(refused(&with(&[("740993", "740992")])).len(), 1);
+        // Like all numerical parameters: a run half way in f32 would be the run of no scene.
+        let mixed = "[numerics]\nprecision = \"mixed\"\n[end]";
+        let message = "numerics.precision: \"mixed\" now, not set when the run was made; it may not change";
+        assert!(refused(&with(&[("[end]", mixed)]))[0].ends_with(message));
     }
 
     #[test]

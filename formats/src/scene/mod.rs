@@ -373,6 +373,15 @@ pub enum Precision {
     Mixed,
 }
 
+impl std::fmt::Display for Precision {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Double => "f64",
+            Self::Mixed => "mixed precision",
+        })
+    }
+}
+
 /// When the run is over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct End {
