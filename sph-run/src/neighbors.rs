@@ -63,6 +63,10 @@ impl Lists {
     }
 }
 
+/// What is found beyond the support, over h. Finding takes as long as a third of a sweep; one in a hundred more pairs makes
+/// each sweep so much longer.
+const MARGIN: f64 = 0.04;
+
 /// Neighbour lists of one rank.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbors<const D: usize> {
@@ -72,8 +76,10 @@ pub struct Neighbors<const D: usize> {
     pub singles: Vec<Mover<D, f32>>,
     /// For the owned particles: particles of all ranges.
     pub of_owned: Lists,
-    /// Of the candidates of owned particles those within the support at this step.
+    /// Of the candidates of owned particles those within the support, and a little more.
     near: Lists,
+    /// How far particles may have gone since, m.
+    moved: f64,
     /// For the wall particles: material particles of all ranges but the walls.
     pub of_wall: Lists,
 }
@@ -92,10 +98,19 @@ impl<const D: usize> Neighbors<D> {
         }
     }
 
-    /// Finds what is within the support now: sweeps go over that.
+    /// Says that particles have moved, none further than `farthest`.
+    pub fn moved(&mut self, farthest: f64) {
+        self.moved += farthest;
+    }
+
+    /// Finds what is within the support, if what was found before no longer holds: sweeps go over it.
     pub fn find(&mut self, x: &[Vector<D>], pairs: Pairs) {
-        let (lists, near) = (&self.of_owned, &mut self.near);
-        pairs.instructions.run(Find { lists, near, x, support: 2.0 * pairs.h });
+        let margin = MARGIN * pairs.h;
+        if self.near.len() != self.of_owned.len() || self.moved > 0.5 * margin {
+            let (lists, near) = (&self.of_owned, &mut self.near);
+            pairs.instructions.run(Find { lists, near, x, support: 2.0 * pairs.h + margin });
+            self.moved = 0.0;
+        }
     }
 
     /// Sums over the pairs of the owned particles.
@@ -111,6 +126,7 @@ impl<const D: usize> Neighbors<D> {
 
     /// Lists of all pairs closer than `reach`.
     pub fn build<const N: usize>(&mut self, particles: &Particles<D, N>, reach: f64, pairs: Pairs) {
+        self.moved = f64::INFINITY;
         let instructions = pairs.instructions;
         let block = instructions.block(match pairs.precision {
             Precision::Double => size_of::<f64>(),

@@ -23,7 +23,7 @@ use formats::h5::Communicator;
 use formats::scene::{Scene, WallLattice};
 
 /// Skin of the neighbour lists over the smoothing length: lists serve until a particle moved half of it.
-const SKIN: f64 = 0.2;
+const SKIN: f64 = 0.3;
 
 /// Fixed numbers of a run.
 #[derive(Clone, Copy, Debug)]

@@ -198,6 +198,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         for (x, shift) in self.particles.x.iter_mut().zip(shift.iter()) {
             *x += self.periods.rounded(*shift);
         }
+        self.neighbors.moved(shifting::LARGEST * pairs.spacing);
         self.buffers = buffers;
     }
 }

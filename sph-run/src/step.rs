@@ -36,6 +36,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.watch.enter(Phase::Motion);
         self.kick(0.5 * dt);
         self.drift(dt);
+        self.neighbors.moved(plan.farthest);
         if plan.lists_go_stale {
             self.watch.enter(Phase::Lists);
             self.rebuild();

@@ -23,6 +23,8 @@ pub struct Plan {
     pub time_step: f64,
     /// Time after the step, s.
     pub time: f64,
+    /// No particle goes further in the step, m.
+    pub farthest: f64,
     /// Will a particle have moved beyond what the neighbour lists allow?
     pub lists_go_stale: bool,
     pub requests: Requests,
@@ -70,10 +72,12 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         }
         let (time_step, time) = meet(self.clock.time, dt, event);
         // No particle goes further than |v| dt + |a| dt^2/2 before the lists are looked at again.
-        let travel = moved2.sqrt() + time_step * (v + 0.5 * a * time_step);
+        let farthest = time_step * (v + 0.5 * a * time_step);
+        let travel = moved2.sqrt() + farthest;
         Ok(Plan {
             time_step,
             time,
+            farthest,
             lists_go_stale: travel > 0.5 * par.skin * (1.0 - 1e-9),
             requests: Requests { stop: Reason::from_code(stop as u8), checkpoint: checkpoint > 0.0 },
         })

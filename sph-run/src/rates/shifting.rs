@@ -13,7 +13,7 @@ const STRENGTH: f64 = 2.0;
 /// (Lee et al. 2008 take 0.75). On a lattice it is 0.98 inside, 0.92 in the second layer, 0.7 in the first.
 const INSIDE: f64 = 0.85;
 /// Largest shift over spacing in one step.
-const LARGEST: f64 = 0.05;
+pub const LARGEST: f64 = 0.05;
 
 /// 1 for the owned particles at a free surface, 0 for all others.
 pub fn surface<const D: usize, const N: usize, K: Kernel>(
