@@ -149,6 +149,7 @@ fn lists_are_combined_with_variants() {
         ("aspect = [10, 2]", "aspect = [2, 2]", "twice"),
         ("beside = \"b\"", "beside = \"c\"", "no series `c`"),
         ("aspect = [10, 2]", "aspect = [-1]", "out of range"),
+        ("mean = [\"series\"]", "spread = true", "spread goes with mean"),
         ("title", "titel", "titel"),
     ] {
         let failure = made_up(work.path(), &STUDY.replacen(from, to, 1)).unwrap_err();
