@@ -161,6 +161,7 @@ fn means(known: &Known, table: &Tabulated, runs: &[&Run]) -> Vec<Vec<String>> {
             let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
             let of = table.fit.as_ref().map(|of| runs.iter().map(|run| known.value(run, None, of)));
             match (finite.len(), of) {
+                (0, _) if done == 0 && runs.iter().any(|run| known.results.of(run).is_some()) => "failed".to_owned(),
                 (0, _) if done == 0 => NOT_RUN.to_owned(),
                 (0, _) => DASH.to_owned(),
                 (_, None) if table.spread => mean_and_spread(&finite),

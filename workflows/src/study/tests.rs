@@ -227,7 +227,8 @@ fn tables_say_what_is_not_there() {
     results.0.insert("a-aspect-2-hard".into(), line(&study, "a-aspect-2-hard", 4.0));
     let failed = Line { exit: 70, measures: BTreeMap::new(), ..line(&study, "a-aspect-2-soft", 0.0) };
     results.0.insert("a-aspect-2-soft".into(), failed);
-    let shown = |k: usize| table::table(&study, &results, &study.tables[k]);
+    let before = results.clone();
+    let shown = |k: usize| table::table(&study, &before, &study.tables[k]);
     let has = |text: &str, line: &str| assert!(text.lines().any(|l| l == line), "no {line}\n{text}");
     let text = shown(0);
     has(&text, "| series | a | run-out | over 2a |");
@@ -237,7 +238,10 @@ fn tables_say_what_is_not_there() {
     has(&text, "| a | 2 | failed (70) | failed (70) |");
     has(&text, "2 of 4 runs, computed by abc, 2026-01-31.");
     has(&shown(1), "| b | 1 of 2 | 25.0 |");
-    let text = shown(2);
+    results.0.get_mut("b-aspect-2").unwrap().exit = 70;
+    has(&table::table(&study, &results, &study.tables[1]), "| b | 0 of 2 | failed |");
+    results.0.get_mut("b-aspect-2").unwrap().exit = 0;
+    let text = table::table(&study, &results, &study.tables[2]);
     has(&text, "| hard | 0.800 |");
     has(&text, "| soft | failed (70) |");
     results.0.get_mut("b-aspect-2").unwrap().scene = "00000000".into();
