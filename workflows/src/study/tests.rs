@@ -21,7 +21,7 @@ fn all() -> Vec<Study> {
 fn every_run_of_every_study_is_a_valid_scene() {
     let studies = all();
     let names: Vec<&str> = studies.iter().map(|study| study.name.as_str()).collect();
-    assert_eq!(names, ["choices", "columns", "columns-3d", "columns-plane"]);
+    assert_eq!(names, ["choices", "columns", "columns-3d", "columns-plane", "time-step"]);
     for study in studies {
         assert!(study.runs.len() >= 10, "{}", study.name);
         for run in &study.runs {
