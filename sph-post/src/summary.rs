@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 /// Whether it has come to rest: `front_mass_last_T` is the change of the 99.5 % front during the last T = sqrt(H0/g), in
 /// r0, null where run-outs are or the run is shorter than T; `kinetic_over_peak` is the kinetic energy at the end over its
 /// peak. Both come from the history where there is one, since it is finer than the snapshots. `energy_closure` and
-/// `dissipated_share` are there only where the history tells the work that was done ([`crate::partition::Partition`]).
+/// `dissipated_share` are there only where the history tells the work that was done ([`crate::partition::Partition`]),
+/// and `peak_speed_m_s`, the largest speed of a particle, where it has the column `max_speed`.
 ///
 /// # Errors
 /// Whatever can't be written.
@@ -51,6 +52,7 @@ fn json(a: &Analysis) -> serde_json::Value {
         "volume_ratio": last.deposit.volume_ratio,
         "front_mass_last_T": front_last(a),
         "kinetic_over_peak": kinetic_over_peak(a),
+        "peak_speed_m_s": peak_speed(a),
         "basal_level_m": a.level,
         "basal_force_over_weight": last.basal.ratio(),
         "basal_centre_ratio": on_axis.ratio,
@@ -114,6 +116,12 @@ fn kinetic_over_peak(a: &Analysis) -> f64 {
     let energies = series(a, "kinetic_energy", |m| m.energy.kinetic);
     let peak = energies.iter().fold(0.0_f64, |peak, e| peak.max(e[1]));
     energies.last().map_or(f64::NAN, |e| e[1] / peak)
+}
+
+/// None without a history of it: snapshots are too far apart to see an impact.
+fn peak_speed(a: &Analysis) -> Option<f64> {
+    let speeds = a.history.as_ref()?.column("max_speed")?;
+    Some(speeds.iter().fold(0.0, |peak, &v| peak.max(v)))
 }
 
 fn profile(a: &Analysis) -> String {

@@ -217,14 +217,16 @@ pub fn spreading(made: &Made) {
         made.snapshot(k, 0.1 * k as f64 * end, 100 * k, &frustum(&made.scene, 0.1 * k as f64));
     }
     let mut text = String::from(
-        "time [s],step [1],kinetic_energy [J],potential_energy [J],elastic_energy [J],stress_work [J],viscous_work [J]\n",
+        "time [s],step [1],kinetic_energy [J],potential_energy [J],elastic_energy [J],stress_work [J],viscous_work [J],\
+         max_speed [m/s]\n",
     );
     for k in 0..=100 {
         let s = f64::from(k) / 100.0;
         let (kinetic, potential) = (2.0 * (s * (1.0 - s)).powi(2), 1.0 - 0.5 * s * s * (3.0 - 2.0 * s));
         let lost = 1.0 - kinetic - potential;
         let (stress, viscous) = (0.9 * lost, 0.1 * lost);
-        let _ = writeln!(text, "{:e},{k},{kinetic:e},{potential:e},{:e},{stress:e},{viscous:e}", s * end, 1e-4);
+        let _ =
+            writeln!(text, "{:e},{k},{kinetic:e},{potential:e},{:e},{stress:e},{viscous:e},{kinetic:e}", s * end, 1e-4);
     }
     made.history(&text);
 }

@@ -127,6 +127,8 @@ fn everything_is_written_and_told() {
         let summary = std::fs::read(made.run.post().join("summary.json")).unwrap();
         let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
         assert_eq!(summary["kinetic_over_peak"].as_f64(), Some(0.0));
+        // The made-up speed is 2 (s (1 - s))^2 at the time s.
+        close(summary["peak_speed_m_s"].as_f64().unwrap(), 0.125, 1e-12, "peak speed");
         let last = summary["front_mass_last_T"].as_f64().unwrap();
         assert!(last > 0.05 && last < summary["runout_mass_99_5"].as_f64().unwrap(), "{last}");
         assert!((summary["volume_ratio"].as_f64().unwrap() - 1.0).abs() < 1e-12);
@@ -222,6 +224,7 @@ fn histories_of_older_runs_are_read_too() {
         serde_json::from_slice(&std::fs::read(made.run.post().join("summary.json")).unwrap()).unwrap();
     assert!(summary.get("energy_closure").is_none() && summary.get("dissipated_share").is_none());
     assert_eq!(summary["mechanical_loss_share"].as_f64(), Some(0.25));
+    assert!(summary["peak_speed_m_s"].is_null(), "{}", summary["peak_speed_m_s"]);
     let history = made.run.post().join("history.nc");
     assert!(results::read(&history, "plastic_work").is_err() && results::read(&history, "kinetic_energy").is_ok());
 }

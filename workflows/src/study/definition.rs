@@ -104,6 +104,9 @@ pub struct Tabulated {
     /// Means over the runs that agree in these parameters (or `series`), in place of a line a run.
     #[serde(default)]
     pub mean: Vec<String>,
+    /// With `mean`: the standard deviation of the runs behind each mean.
+    #[serde(default)]
+    pub spread: bool,
     /// With `mean`: power laws of this parameter, c x^n by least squares of the logarithms, in place of means.
     pub fit: Option<String>,
 }
@@ -356,6 +359,9 @@ impl Study {
             }
             if table.fit.is_some() && table.mean.is_empty() {
                 return Err(place("fit goes with mean, the parameters that are kept apart".into()));
+            }
+            if table.spread && (table.mean.is_empty() || table.fit.is_some()) {
+                return Err(place("spread goes with mean, and not with fit".into()));
             }
             for key in table.mean.iter().chain(&table.fit) {
                 let known = key == "series" || self.parameters.contains(key);

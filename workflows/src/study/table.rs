@@ -161,8 +161,10 @@ fn means(known: &Known, table: &Tabulated, runs: &[&Run]) -> Vec<Vec<String>> {
             let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
             let of = table.fit.as_ref().map(|of| runs.iter().map(|run| known.value(run, None, of)));
             match (finite.len(), of) {
+                (0, _) if done == 0 && runs.iter().any(|run| known.results.of(run).is_some()) => "failed".to_owned(),
                 (0, _) if done == 0 => NOT_RUN.to_owned(),
                 (0, _) => DASH.to_owned(),
+                (_, None) if table.spread => mean_and_spread(&finite),
                 (n, None) => short(finite.iter().sum::<f64>() / n as f64),
                 (_, Some(of)) => match power_law(&of.zip(values.iter().copied()).collect::<Vec<_>>()) {
                     Some([factor, power]) => format!("{} x^{power:.2}", short(factor)),
@@ -174,6 +176,26 @@ fn means(known: &Known, table: &Tabulated, runs: &[&Run]) -> Vec<Vec<String>> {
         keys.iter().map(Value::to_string).chain([format!("{done} of {}", runs.len())]).chain(cells).collect()
     };
     groups.into_iter().map(line).collect()
+}
+
+/// Mean, and the standard deviation of the values (not of their mean), with one digit; none of a single value.
+fn mean_and_spread(values: &[f64]) -> String {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    match values.len() {
+        0 | 1 => short(mean),
+        _ => format!("{} ± {}", short(mean), one_digit((squares / (n - 1.0)).sqrt())),
+    }
+}
+
+/// One digit, as far as the fourth decimal.
+fn one_digit(value: f64) -> String {
+    match value {
+        0.0 => "0".into(),
+        v if v < 1e-4 => format!("{v:.0e}"),
+        v => format!("{v:.*}", (-v.log10().floor()).clamp(0.0, 4.0) as usize),
+    }
 }
 
 /// Factor and power of y = c x^n by least squares of the logarithms; none through fewer than three points.
@@ -212,6 +234,14 @@ mod tests {
         assert!((factor - 1.6).abs() < 1e-12 && (power - 0.5).abs() < 1e-12, "{factor} {power}");
         assert_eq!(power_law(&points[..2]), None);
         assert_eq!(power_law(&[(1.0, f64::NAN), (2.0, 1.0), (3.0, 1.0)]), None);
+    }
+
+    #[test]
+    fn the_spread_is_the_standard_deviation_of_the_runs() {
+        assert_eq!(mean_and_spread(&[1.18, 1.24, 1.21]), "1.21 ± 0.03");
+        assert_eq!(mean_and_spread(&[0.5]), "0.500");
+        assert_eq!(mean_and_spread(&[2.0, 2.0]), "2.00 ± 0");
+        assert_eq!([12.0, 0.25, 0.004, 2e-6].map(one_digit), ["12", "0.2", "0.004", "2e-6"]);
     }
 
     #[test]

@@ -21,7 +21,7 @@ fn all() -> Vec<Study> {
 fn every_run_of_every_study_is_a_valid_scene() {
     let studies = all();
     let names: Vec<&str> = studies.iter().map(|study| study.name.as_str()).collect();
-    assert_eq!(names, ["choices", "columns", "columns-3d", "columns-plane"]);
+    assert_eq!(names, ["choices", "columns", "columns-3d", "columns-plane", "time-step"]);
     for study in studies {
         assert!(study.runs.len() >= 10, "{}", study.name);
         for run in &study.runs {
@@ -149,6 +149,7 @@ fn lists_are_combined_with_variants() {
         ("aspect = [10, 2]", "aspect = [2, 2]", "twice"),
         ("beside = \"b\"", "beside = \"c\"", "no series `c`"),
         ("aspect = [10, 2]", "aspect = [-1]", "out of range"),
+        ("mean = [\"series\"]", "spread = true", "spread goes with mean"),
         ("title", "titel", "titel"),
     ] {
         let failure = made_up(work.path(), &STUDY.replacen(from, to, 1)).unwrap_err();
@@ -226,7 +227,8 @@ fn tables_say_what_is_not_there() {
     results.0.insert("a-aspect-2-hard".into(), line(&study, "a-aspect-2-hard", 4.0));
     let failed = Line { exit: 70, measures: BTreeMap::new(), ..line(&study, "a-aspect-2-soft", 0.0) };
     results.0.insert("a-aspect-2-soft".into(), failed);
-    let shown = |k: usize| table::table(&study, &results, &study.tables[k]);
+    let before = results.clone();
+    let shown = |k: usize| table::table(&study, &before, &study.tables[k]);
     let has = |text: &str, line: &str| assert!(text.lines().any(|l| l == line), "no {line}\n{text}");
     let text = shown(0);
     has(&text, "| series | a | run-out | over 2a |");
@@ -236,7 +238,10 @@ fn tables_say_what_is_not_there() {
     has(&text, "| a | 2 | failed (70) | failed (70) |");
     has(&text, "2 of 4 runs, computed by abc, 2026-01-31.");
     has(&shown(1), "| b | 1 of 2 | 25.0 |");
-    let text = shown(2);
+    results.0.get_mut("b-aspect-2").unwrap().exit = 70;
+    has(&table::table(&study, &results, &study.tables[1]), "| b | 0 of 2 | failed |");
+    results.0.get_mut("b-aspect-2").unwrap().exit = 0;
+    let text = table::table(&study, &results, &study.tables[2]);
     has(&text, "| hard | 0.800 |");
     has(&text, "| soft | failed (70) |");
     results.0.get_mut("b-aspect-2").unwrap().scene = "00000000".into();
