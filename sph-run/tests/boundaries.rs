@@ -216,7 +216,13 @@ fn what_gets_behind_a_mirror_is_put_back(comm: &Communicator) {
     (rows.position[40][2], rows.velocity[40][2]) = (1e-6, -8.0);
     let mut run = start::<2, 4, Plane>(comm, &scene, &rows);
     let dt = 1e-4;
-    let plan = sph_run::timestep::Plan { time_step: dt, time: dt, farthest: 0.0, lists_go_stale: true, requests: Requests::default() };
+    let plan = sph_run::timestep::Plan {
+        time_step: dt,
+        time: dt,
+        farthest: 0.0,
+        lists_go_stale: true,
+        requests: Requests::default(),
+    };
     run.step(&plan);
     let (p, at) = (&run.particles, by_id(&run.particles));
     let (side, floor) = (p.x[at[95]], p.x[at[40]]);
