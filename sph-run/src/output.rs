@@ -7,6 +7,7 @@ use crate::physics::Physics;
 use crate::report;
 use crate::simulation::{Clock, Simulation};
 use crate::space::Space as _;
+use crate::stabilize::Buffers;
 use formats::folder::RunFolder;
 use formats::outputs::{Index, LONGEST, Segment};
 use formats::scene::Scene;
@@ -36,7 +37,10 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     }
 
     /// This rank's share of all particles, in ascending id. Collective.
-    pub fn rows(&self) -> Rows {
+    pub fn rows(&mut self) -> Rows {
+        // What lives within a step makes room for them.
+        self.buffers = Buffers::default();
+        self.neighbors.release();
         let mut rows = gather::rows::<D, N, P::Space>(self.comm, &self.particles, self.parameters.count);
         // Between builds of the lists particles may lie beyond a periodic border; when that is must not show.
         for x in &mut rows.position {
@@ -46,7 +50,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     }
 
     /// Writes a particle file. Collective.
-    pub fn write_snapshot(&self, path: &Path, header: &Header, kept: Kept) -> Result<Digests, RunError> {
+    pub fn write_snapshot(&mut self, path: &Path, header: &Header, kept: Kept) -> Result<Digests, RunError> {
         Ok(snapshot::write(path, header, &self.rows(), kept, self.comm)?)
     }
 }

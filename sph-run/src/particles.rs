@@ -77,22 +77,42 @@ impl<const D: usize, const N: usize> Particles<D, N> {
     /// From rows of a particle file; accelerations are zero where the file has none.
     pub fn from_rows<S: Space<D, N>>(rows: &Rows) -> Self {
         let mut particles = Self::default();
-        for i in 0..rows.len() {
-            particles.key.push(key(rows.id[i], 0));
-            particles.x.push(S::from_disk(rows.position[i]));
-            particles.v.push(S::from_disk(rows.velocity[i]));
-            particles.stress.push(S::stress_from_disk(rows.stress[i]));
-            particles.a.push(rows.acceleration.get(i).map_or_else(Vector::default, |&a| S::from_disk(a)));
-            particles.mass.push(rows.mass[i]);
-            particles.density.push(rows.density[i]);
-            particles.history.push(History { plastic_strain: rows.plastic_strain[i] });
-            particles.work.push(Work { stress: rows.stress_work[i], viscous: rows.viscous_work[i] });
-            particles.body.push(rows.body[i]);
-        }
-        particles.volume = vec![0.0; rows.len()];
-        particles.viscosity = vec![0.0; rows.len()];
-        particles.own(rows.len());
+        particles.add_rows::<S>(rows);
         particles
+    }
+
+    /// Makes room for so many particles.
+    pub fn reserve(&mut self, count: usize) {
+        self.key.reserve_exact(count);
+        self.x.reserve_exact(count);
+        self.v.reserve_exact(count);
+        self.volume.reserve_exact(count);
+        self.stress.reserve_exact(count);
+        self.viscosity.reserve_exact(count);
+        self.a.reserve_exact(count);
+        self.mass.reserve_exact(count);
+        self.density.reserve_exact(count);
+        self.history.reserve_exact(count);
+        self.work.reserve_exact(count);
+        self.body.reserve_exact(count);
+    }
+
+    /// Takes in the particles of some rows as owned ones; there must be no other ranges.
+    pub fn add_rows<S: Space<D, N>>(&mut self, rows: &Rows) {
+        debug_assert_eq!(self.owned, self.len());
+        for i in 0..rows.len() {
+            self.key.push(key(rows.id[i], 0));
+            self.x.push(S::from_disk(rows.position[i]));
+            self.v.push(S::from_disk(rows.velocity[i]));
+            self.stress.push(S::stress_from_disk(rows.stress[i]));
+            self.a.push(rows.acceleration.get(i).map_or_else(Vector::default, |&a| S::from_disk(a)));
+            self.mass.push(rows.mass[i]);
+            self.density.push(rows.density[i]);
+            self.history.push(History { plastic_strain: rows.plastic_strain[i] });
+            self.work.push(Work { stress: rows.stress_work[i], viscous: rows.viscous_work[i] });
+            self.body.push(rows.body[i]);
+        }
+        self.own(self.key.len());
     }
 
     /// The owned particles as rows of a file, in the order they have here.

@@ -17,6 +17,7 @@ use crate::progress::Progress;
 use crate::report::Scales;
 use crate::resume::{Past, Start};
 use crate::simulation::Simulation;
+use crate::space::Space;
 use crate::timestep::Requests;
 use formats::folder::RunFolder;
 use formats::h5::{self, Communicator};
@@ -27,6 +28,7 @@ use formats::scene::Scene;
 use formats::schema::Kept;
 use formats::snapshot::FileError;
 use formats::{checkpoint, disk, snapshot};
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 /// How a run ended.
@@ -71,9 +73,7 @@ impl Job for Run<'_> {
         }
         let count = header.count;
         let (rank, size) = (self.comm.rank() as u64, self.comm.size() as u64);
-        let (_, rows) = snapshot::read_rows(&self.start.particles, snapshot::share(count, rank, size), self.comm)?;
-        let particles = Particles::from_rows::<P::Space>(&rows);
-        drop(rows);
+        let particles = self.read::<D, N, P::Space>(count, snapshot::share(count, rank, size))?;
         let (comm, scene, clock) = (self.comm, self.scene, self.start.clock);
         let instructions = self.instructions;
         let mut simulation =
@@ -99,7 +99,26 @@ impl Job for Run<'_> {
     }
 }
 
+/// Rows a rank reads at a time.
+const PASS: u64 = 1 << 18;
+
 impl Run<'_> {
+    /// This rank's share of the particles. Collective.
+    fn read<const D: usize, const N: usize, S: Space<D, N>>(
+        &self,
+        count: u64,
+        mine: Range<u64>,
+    ) -> Result<Particles<D, N>, RunError> {
+        let mut particles = Particles::default();
+        particles.reserve((mine.end - mine.start) as usize);
+        for pass in 0..count.div_ceil(self.comm.size() as u64).div_ceil(PASS) {
+            let some = (mine.start + pass * PASS).min(mine.end)..(mine.start + (pass + 1) * PASS).min(mine.end);
+            let (_, rows) = snapshot::read_rows(&self.start.particles, some, self.comm)?;
+            particles.add_rows::<S>(&rows);
+        }
+        Ok(particles)
+    }
+
     /// What pairs are computed in, for people.
     fn numbers(&self) -> String {
         format!("{}, {} instructions", self.scene.numerics.precision, self.instructions)
@@ -328,6 +347,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
     fn checkpoint(&mut self, over: bool) -> Result<(), RunError> {
         let begun = Instant::now();
         self.simulation.watch.enter(Phase::Output);
+        let rows = self.simulation.rows();
         let job = &self.job;
         let outputs = self.outputs.as_ref().map(Outputs::now);
         let still_ours = || {
@@ -337,7 +357,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         let new = checkpoint::Generation {
             folder: job.folder,
             header: &self.simulation.header(job.scene, &job.scene_hash),
-            rows: &self.simulation.rows(),
+            rows: &rows,
             clock: &crate::resume::clock_to_json(&self.simulation.clock, over),
             outputs: outputs.as_ref(),
             scene: &job.start.scene,

@@ -170,6 +170,39 @@ impl Rows {
         Some(format!("row {number} holds particle {}, not {number}", self.id[row]))
     }
 
+    /// None yet, with room for so many.
+    pub fn with_room(first: u64, count: usize) -> Self {
+        Self {
+            first,
+            id: Vec::with_capacity(count),
+            body: Vec::with_capacity(count),
+            position: Vec::with_capacity(count),
+            velocity: Vec::with_capacity(count),
+            acceleration: Vec::with_capacity(count),
+            mass: Vec::with_capacity(count),
+            density: Vec::with_capacity(count),
+            stress: Vec::with_capacity(count),
+            stress_work: Vec::with_capacity(count),
+            viscous_work: Vec::with_capacity(count),
+            plastic_strain: Vec::with_capacity(count),
+        }
+    }
+
+    /// Appends the rows that follow.
+    pub fn append(&mut self, mut next: Self) {
+        self.id.append(&mut next.id);
+        self.body.append(&mut next.body);
+        self.position.append(&mut next.position);
+        self.velocity.append(&mut next.velocity);
+        self.acceleration.append(&mut next.acceleration);
+        self.mass.append(&mut next.mass);
+        self.density.append(&mut next.density);
+        self.stress.append(&mut next.stress);
+        self.stress_work.append(&mut next.stress_work);
+        self.viscous_work.append(&mut next.viscous_work);
+        self.plastic_strain.append(&mut next.plastic_strain);
+    }
+
     /// Number of rows here.
     pub fn len(&self) -> usize {
         self.id.len()

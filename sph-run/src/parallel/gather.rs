@@ -8,44 +8,67 @@ use formats::h5::Communicator;
 use formats::snapshot::{Rows, share};
 use mpi::datatype::{Partition, PartitionMut};
 use mpi::traits::{Communicator as _, *};
+use std::ops::Range;
 
-/// The rows of this rank's share of all `count` particles.
+/// Rows a rank gets at a time: with more, the copies under way would take more memory than the particles.
+const PASS: u64 = 1 << 17;
+
+/// The rows of this rank's share of all `count` particles. Collective.
 pub fn rows<const D: usize, const N: usize, S: Space<D, N>>(
     comm: &Communicator,
     particles: &Particles<D, N>,
     count: u64,
 ) -> Rows {
-    let size = comm.size() as u64;
+    let (rank, size) = (comm.rank() as u64, comm.size() as u64);
     let mut order: Vec<u32> = (0..particles.owned as u32).collect();
     order.sort_unstable_by_key(|&i| particles.key[i as usize]);
-
-    let mut outgoing = Vec::with_capacity(particles.owned * packed_len(D, N));
-    let mut lengths = vec![0i32; size as usize];
-    let mut rank = 0;
-    for i in order {
-        let id = crate::particles::id(particles.key[i as usize]);
-        while !share(count, rank, size).contains(&id) {
-            rank += 1;
-        }
-        particles.pack(i as usize, &mut outgoing);
-        lengths[rank as usize] += packed_len(D, N) as i32;
+    let mine = share(count, rank, size);
+    let mut rows = Rows::with_room(mine.start, (mine.end - mine.start) as usize);
+    for pass in 0..count.div_ceil(size).div_ceil(PASS) {
+        let wanted = |rank: u64| {
+            let Range { start, end } = share(count, rank, size);
+            (start + pass * PASS).min(end)..(start + (pass + 1) * PASS).min(end)
+        };
+        rows.append(some_rows::<D, N, S>(comm, particles, &order, wanted));
     }
-    let mut incoming_lengths = vec![0i32; size as usize];
+    rows
+}
+
+/// The rows of the ids `wanted(rank)` for every rank. `order`: the particles in ascending key. Collective.
+fn some_rows<const D: usize, const N: usize, S: Space<D, N>>(
+    comm: &Communicator,
+    particles: &Particles<D, N>,
+    order: &[u32],
+    wanted: impl Fn(u64) -> Range<u64>,
+) -> Rows {
+    let id = |&i: &u32| crate::particles::id(particles.key[i as usize]);
+    let mut outgoing = Vec::new();
+    let mut lengths = Vec::new();
+    for rank in 0..comm.size() as u64 {
+        let Range { start, end } = wanted(rank);
+        let from = order.partition_point(|i| id(i) < start);
+        let to = order.partition_point(|i| id(i) < end);
+        for &i in &order[from..to] {
+            particles.pack(i as usize, &mut outgoing);
+        }
+        lengths.push(((to - from) * packed_len(D, N)) as i32);
+    }
+    let mut incoming_lengths = vec![0i32; lengths.len()];
     comm.all_to_all_into(&lengths[..], &mut incoming_lengths[..]);
     let mut incoming = vec![0u64; incoming_lengths.iter().map(|&n| n as usize).sum()];
     comm.all_to_all_varcount_into(
         &Partition::new(&outgoing[..], &lengths[..], starts(&lengths)),
         &mut PartitionMut::new(&mut incoming[..], &incoming_lengths[..], starts(&incoming_lengths)),
     );
+    drop(outgoing);
 
     let mut mine = Particles::<D, N>::default();
     mine.unpack(&incoming);
+    drop(incoming);
     let mut order: Vec<u32> = (0..mine.owned as u32).collect();
     order.sort_unstable_by_key(|&i| mine.key[i as usize]);
     mine.arrange(&order);
-    let mut rows = mine.to_rows::<S>();
-    rows.first = share(count, comm.rank() as u64, size).start;
-    rows
+    mine.to_rows::<S>()
 }
 
 fn starts(lengths: &[i32]) -> Vec<i32> {
