@@ -349,6 +349,12 @@ fn numerics_out_of_range_or_without_effect() {
     soil("damping-in-flow = \"yes\"", (12, 19), "damping-in-flow", "valid: refused, forced");
     soil("precision = \"f32\"", (12, 13), "precision", "valid: f64, mixed");
     soil("precision = 64", (12, 13), "precision", "one of \"f64\", \"mixed\" is needed");
+    let mixed = "precision = \"mixed\"\ncourant";
+    let message = "\"mixed\" with a period: the bits of the answer would depend on where a run was stopped; set \"f64\", or take \
+                   walls instead of the period";
+    bad(GRAINS, "courant", mixed, (17, 13), "numerics.precision", message);
+    let along_y = FLUID.replace("[material", "periodic.y = { from = 0, to = 0.1 }\n[material");
+    bad(&along_y, "courant", mixed, (14, 13), "numerics.precision", message);
     soil(
         "viscous-courant = 0.1",
         (12, 19),
@@ -366,6 +372,10 @@ fn numerics_out_of_range_or_without_effect() {
     bad(FLUID, "courant", "stress-diffusion = 0.1\ncourant", (13, 20), "numerics.stress-diffusion", diffusion);
     bad(GRAINS, "courant", "stress-diffusion = 0.1\ncourant", (17, 20), "numerics.stress-diffusion", diffusion);
 
+    // A period takes f64, and mixed precision goes with all laws.
+    good(GRAINS, "courant", "precision = \"f64\"\ncourant");
+    good(&GRAINS.replace("periodic.x = { from = 0, to = \"0.2 m\" }\n", ""), "courant", mixed);
+    good(FLUID, "courant", mixed);
     // Off is off, and what carries its stress along may diffuse it.
     good(FLUID, "courant", "density-gate = 0\nstress-diffusion = 0\ncourant");
     let elastic = GRAINS.replace("[body.layer]", "unyielded = \"elastic\"\n[body.layer]");

@@ -100,6 +100,11 @@ const SCENES: &[(&str, &str, &str)] = &[
     ),
     (
         "[end]",
+        "[periodic]\nx = { from = 0, to = 0.1 }\n[numerics]\nprecision = \"mixed\"\n[end]",
+        "depend on where a run was stopped",
+    ),
+    (
+        "[end]",
         "[wall.lid]\naxis = \"z\"\nat = \"0.02 m\"\nside = \"below\"\nslip = \"no-slip\"\nkind = \"mirror\"\n[end]",
         "2.2 h",
     ),

@@ -398,10 +398,11 @@ fn slab_of_mirrors_and_periods() {
     in_pieces(&trial);
 }
 
-/// Pairs in f32: with the plain operators and with the corrected ones.
+/// Pairs in f32: with the plain operators and with the corrected ones, and beside walls of both kinds. A period takes f64.
 #[test]
 fn mixed_precision() {
-    for text in [scene(SOLID), scene(RINGS), STABILISED.to_owned()] {
+    let corner = scene(CORNER).replace("slip = \"no-slip\"", "slip = \"no-slip\"\nkind = \"mirror\"");
+    for text in [scene(SOLID), scene(RINGS), STABILISED.to_owned(), corner] {
         let text = mixed(&text);
         let trial = Trial::new(&text);
         on_ranks(&trial, &text, 2, &[]);

@@ -53,7 +53,8 @@ fn read(root: Table<'_>) -> Option<Scene> {
     let initial = initial::read(&root, &setting, material.as_ref());
     // With a fault in a body or a wall nothing certain can be said.
     let flow = bodies.as_ref().zip(walls.as_ref()).and_then(|(b, w)| held::what_flows(b, w, &setting));
-    let place = numerics::Place { space: setting.space, kernel, h_over_dx, flow };
+    let periodic = setting.periodic.iter().any(Option::is_some);
+    let place = numerics::Place { space: setting.space, kernel, h_over_dx, periodic, flow };
     let numerics = numerics::read(&root, place, material.as_ref());
     let end = end(&root);
     let output = output(&root, end.as_ref());

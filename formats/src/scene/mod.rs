@@ -369,7 +369,7 @@ pub enum Precision {
     /// f64.
     #[default]
     Double,
-    /// f32, from differences of places that are as good as f32 can hold.
+    /// f32, from differences of places that are as good as f32 can hold. Not along a period.
     Mixed,
 }
 

@@ -18,6 +18,8 @@ pub(super) struct Place {
     pub space: Option<Space>,
     pub kernel: Kernel,
     pub h_over_dx: f64,
+    /// Whether any axis has a period.
+    pub periodic: bool,
     /// What lets the material flow; None where it can only settle.
     pub flow: Option<String>,
 }
@@ -41,6 +43,16 @@ pub(super) fn read(root: &Table<'_>, place: Place, material: Option<&Material>) 
     let shifting = table.number("shifting", Dimension::Number, &UNIT);
 
     let precision = table.choice("precision", &[("f64", Precision::Double), ("mixed", Precision::Mixed)]);
+
+    // Places in f32 round differently on the two sides of a border, and a restart tells particles on the other one.
+    if let Some(found) = &precision
+        && found.value == Precision::Mixed
+        && place.periodic
+    {
+        let source = table.faults.source(found);
+        let message = format!("{source} with a period: the bits of the answer would depend on where a run was stopped");
+        table.faults.at(found, format!("{message}; set \"f64\", or take walls instead of the period"));
+    }
 
     let corrected = gradient_correction.as_ref().is_some_and(|found| found.value);
     let (limit, reason) = if place.space == Some(Space::Axisymmetric) {
