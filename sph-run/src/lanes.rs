@@ -132,12 +132,6 @@ pub trait Lanes: Part + Debug {
     fn largest(self, other: Self) -> Self;
     /// Is the number below the other's in any lane?
     fn any_below(self, other: Self) -> bool;
-
-    /// |x|
-    #[inline(always)]
-    fn size(self) -> Self {
-        self.largest(-self)
-    }
 }
 
 /// 1/sqrt(x) in f32.

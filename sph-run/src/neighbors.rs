@@ -63,8 +63,8 @@ impl Lists {
     }
 }
 
-/// What is found beyond the support, over h. Finding takes as long as a third of a sweep; one in a hundred more pairs makes
-/// each sweep so much longer.
+/// What is found beyond the support, over h. Finding takes as long as a fifth of the two sweeps of a step; each hundredth
+/// of h makes those 1 % longer.
 const MARGIN: f64 = 0.04;
 
 /// Neighbour lists of one rank.
