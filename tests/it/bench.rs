@@ -30,7 +30,10 @@ fn speed_writes_a_page() {
     let text = std::fs::read_to_string(&page).unwrap();
     let row = text.lines().find(|line| line.starts_with("| rz-mu-i-wendland | axisymmetric | mu-i |")).expect(&text);
     assert!(row.contains("| f64 | 625 | 10 |"), "{row}");
-    assert!(text.contains("of peak (50.0 GFLOP/s)") && text.contains("| one rank | support | gradient | material |"), "{text}");
+    assert!(
+        text.contains("of peak (50.0 GFLOP/s)") && text.contains("| one rank | support | gradient | material |"),
+        "{text}"
+    );
     // The run in the middle of its collapse is kept: no other preparation.
     let again = run_within(TIME_LIMIT, &mut bench(work.path(), &words)).expect(exit::DONE);
     assert!(output.stderr.contains("goes to the middle") && !again.stderr.contains("goes to the middle"), "{again}");
