@@ -58,7 +58,7 @@ fn moved(folder: &RunFolder, axis: usize) -> f64 {
 /// F8: columns between smooth walls settle as far as in f64 in 50 sqrt(H/g), stay at rest, and do not drift from one wall to
 /// the other, as both do the same. Increments of 4e4 steps add up to places in f64, so creep of any speed is kept.
 #[test]
-fn f8_long_rest() {
+fn long_rest() {
     let (height, spacing) = (0.1_f64, 0.01);
     let unit = (height / GRAVITY).sqrt();
     let grains = "[material.mu-i]\ndensity = 1500\nsound-speed = 10\nfriction-static = 0.38\nunyielded = \"elastic\"\n";
@@ -120,7 +120,7 @@ fn outcome(folder: &RunFolder, x: f64) -> [f64; 3] {
 /// F8: a collapse in mixed precision ends as in f64, and 100 m away as at the origin, though at 100 m, which is 17 000 h, an f32
 /// resolves a place to no more than h/1000.
 #[test]
-fn f8_a_collapse_and_the_same_100_m_away() {
+fn a_collapse_and_the_same_100_m_away() {
     const SPACING: f64 = 0.005;
     let work = WorkFolder::new();
     let [double, mixed] = both(&work, &collapse(0.0, 0.0));
@@ -145,7 +145,7 @@ fn f8_a_collapse_and_the_same_100_m_away() {
 
 /// F8: a contrast of viscosities of 2e5, water beside what does not yield (Szewc 2017, Fig 1).
 #[test]
-fn f8_viscosities_from_a_mpa_s_to_200_pa_s() {
+fn viscosities_from_a_mpa_s_to_200_pa_s() {
     let text = format!(
         "space = \"plane-strain\"\nspacing = 0.005\nsymmetry = [\"x\"]\n\
          [material.visco-plastic]\ndensity = 2600\nsound-speed = 10\nfriction = \"22 deg\"\ncohesion = 0\n\

@@ -225,7 +225,7 @@ mod tests {
         let two = || vec![launch(0.05, 2)];
         let one = || vec![launch(0.1, 1)];
         let copies = || vec![[launch(0.125, 1), launch(0.125, 1)]];
-        let rows = [0, 5].map(|row| Measured { row: ROWS[row], one: one(), copies: copies(), two: two() });
+        let rows = [0, 6].map(|row| Measured { row: ROWS[row], one: one(), copies: copies(), two: two() });
         let page = speed(&Heading::example(), &rows, 0.89e9, false);
         assert!(is_even(&page), "{page}");
         for text in [
