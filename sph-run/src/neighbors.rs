@@ -201,18 +201,28 @@ fn find<const D: usize, S: Simd, const R: usize>(
             if let Some(&ahead) = candidates.get(n + AHEAD) {
                 prefetch(&x[ahead as usize]);
             }
-            let place = &x[j as usize];
-            let place = Vector::from_parts(|a| Doubles::all(token, place.0[a]));
-            let mut within = false;
-            for r in 0..R {
-                within |= (own[r] - place).norm2().any_below(support2);
-            }
             found[end] = j;
-            end += usize::from(within);
+            end += usize::from(is_near(token, &own, &x[j as usize], support2));
         }
         near.candidates.truncate(end);
         near.close();
     }
+}
+
+/// Is a place within a distance of any particle of a block?
+#[inline(always)]
+fn is_near<const D: usize, S: Simd>(
+    token: S,
+    own: &[Vector<D, Doubles<S>>],
+    place: &Vector<D>,
+    distance2: Doubles<S>,
+) -> bool {
+    let place = Vector::from_parts(|a| Doubles::all(token, place.0[a]));
+    let mut near = false;
+    for &own in own {
+        near |= (own - place).norm2().any_below(distance2);
+    }
+    near
 }
 
 fn movers<const D: usize, const N: usize, K: Kernel, T: Element>(
@@ -263,12 +273,7 @@ impl<const D: usize> WithSimd for Build<'_, D> {
                 found.resize(end + run.len(), 0);
                 for (&number, place) in cells.numbers[run.clone()].iter().zip(&cells.places[run.clone()]) {
                     found[end] = number;
-                    let place = Vector::from_parts(|a| Doubles::all(token, place.0[a]));
-                    let mut near = false;
-                    for &own in &lanes {
-                        near |= (own - place).norm2().any_below(reach2);
-                    }
-                    end += usize::from(near);
+                    end += usize::from(is_near(token, &lanes, place, reach2));
                 }
                 found.truncate(end);
             }

@@ -4,12 +4,12 @@
 //! scheme pays nothing.
 
 use crate::algebra::{Matrix, Sym, Vector};
-use crate::boundary::wall::extend;
 use crate::material::Material as _;
 use crate::phases::Phase;
 use crate::physics::Physics;
 use crate::rates::correction::{Among, correction};
 use crate::rates::momentum::Stressed;
+use crate::rates::wall::extrapolate;
 use crate::rates::{artificial_stress, diffusion, shifting, viscosity};
 use crate::simulation::Simulation;
 use formats::scene::Scene;
@@ -145,7 +145,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         }
         let mut viscosity = std::mem::take(&mut self.particles.viscosity);
         self.spread(&mut viscosity);
-        extend::<D, N, P::Kernel, _>(&self.particles, &self.neighbors, self.parameters.pairs, &mut viscosity);
+        extrapolate::<D, P::Kernel, _>(&self.neighbors, self.parameters.pairs, &mut viscosity);
         self.particles.viscosity = viscosity;
     }
 

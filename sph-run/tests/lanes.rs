@@ -300,11 +300,11 @@ fn sums<const D: usize, const N: usize, S: Space<D, N>, K: Kernel>(
     let how = shifting::Shifting { strength: 1.0, dt: 0.02, surface: &surface };
     shifting::shift::<D, N, K>(p, &neighbors, pairs, how, &mut shift);
     keep(&mut bits, "shift", all, &shift);
-    let (mut v, mut stress) = (Vec::new(), Vec::new());
-    extrapolate::<D, N, K, _>(p, &neighbors, pairs, &p.v, &mut v);
-    extrapolate::<D, N, K, _>(p, &neighbors, pairs, &p.stress, &mut stress);
-    keep(&mut bits, "velocity at walls", walls, &v);
-    keep(&mut bits, "stress at walls", walls, &stress);
+    let (mut v, mut stress) = (p.v.clone(), p.stress.clone());
+    extrapolate::<D, K, _>(&neighbors, pairs, &mut v);
+    extrapolate::<D, K, _>(&neighbors, pairs, &mut stress);
+    keep(&mut bits, "velocity at walls", walls, &v[p.mirror..]);
+    keep(&mut bits, "stress at walls", walls, &stress[p.mirror..]);
     let singles = match pairs.precision {
         Precision::Double => Bits::new(),
         Precision::Mixed => plain_sums::<D, N, S, K, f32>(p, pairs, reach, names),

@@ -7,7 +7,6 @@
 
 use crate::algebra::Vector;
 use crate::boundary::mirror::reflect_stress;
-use crate::lanes::Parts;
 use crate::neighbors::{Neighbors, blocks_order};
 use crate::particles::Particles;
 use crate::physics::Kernel;
@@ -79,10 +78,9 @@ impl Walls {
         neighbors: &Neighbors<D>,
         pairs: Pairs,
     ) {
-        let mut velocities = Vec::new();
-        extrapolate::<D, N, K, _>(p, neighbors, pairs, &p.v, &mut velocities);
-        for ((parity, v), kept) in self.parities.iter().zip(velocities).zip(&mut p.v[p.mirror..]) {
-            let mut v = S::to_disk(v);
+        extrapolate::<D, K, _>(neighbors, pairs, &mut p.v);
+        for (parity, kept) in self.parities.iter().zip(&mut p.v[p.mirror..]) {
+            let mut v = S::to_disk(*kept);
             for a in 0..3 {
                 v[a] = v[a] * parity.velocity[a] + parity.motion[a];
             }
@@ -97,24 +95,11 @@ impl Walls {
         neighbors: &Neighbors<D>,
         pairs: Pairs,
     ) {
-        let mut stresses = Vec::new();
-        extrapolate::<D, N, K, _>(p, neighbors, pairs, &p.stress, &mut stresses);
-        for ((parity, stress), kept) in self.parities.iter().zip(stresses).zip(&mut p.stress[p.mirror..]) {
-            *kept = S::stress_from_disk(reflect_stress(S::stress_to_disk(stress), parity.reflected));
+        extrapolate::<D, K, _>(neighbors, pairs, &mut p.stress);
+        for (parity, kept) in self.parities.iter().zip(&mut p.stress[p.mirror..]) {
+            *kept = S::stress_from_disk(reflect_stress(S::stress_to_disk(*kept), parity.reflected));
         }
     }
-}
-
-/// Extrapolates a field that does not change across a wall.
-pub fn extend<const D: usize, const N: usize, K: Kernel, F: Parts<Number = f64> + Default>(
-    p: &Particles<D, N>,
-    neighbors: &Neighbors<D>,
-    pairs: Pairs,
-    field: &mut [F],
-) {
-    let mut values = Vec::new();
-    extrapolate::<D, N, K, _>(p, neighbors, pairs, field, &mut values);
-    field[p.mirror..].copy_from_slice(&values);
 }
 
 fn unique(sites: &mut Vec<(u64, Site)>) {

@@ -2,31 +2,27 @@
 
 use crate::lanes::{Lanes, Parts};
 use crate::neighbors::Neighbors;
-use crate::particles::Particles;
 use crate::physics::Kernel;
 use crate::sweep::{Block, Needs, Pair, Pairs, Sums, Sweep};
 
 /// Shepard's interpolation of a field at every wall particle, sum_j V_j W_wj f_j/sum_j V_j W_wj over the material; zero where
-/// no material is in reach. `field` holds all particles of the material, and may hold more.
-pub fn extrapolate<const D: usize, const N: usize, K: Kernel, F: Parts<Number = f64> + Default>(
-    particles: &Particles<D, N>,
+/// no material is in reach. `field` has all particles, those of the walls last: they get what the material around them has.
+pub fn extrapolate<const D: usize, K: Kernel, F: Parts<Number = f64>>(
     neighbors: &Neighbors<D>,
     pairs: Pairs,
-    field: &[F],
-    at_walls: &mut Vec<F>,
+    field: &mut [F],
 ) {
-    at_walls.clear();
-    at_walls.resize(particles.len() - particles.mirror, F::default());
-    let first = particles.mirror;
     let (movers, lists) = (&neighbors.movers[..], &neighbors.of_wall);
+    let first = field.len() - lists.len();
+    let (material, walls) = field.split_at_mut(first);
     let sweep = Sweep { movers, lists, part: 0..lists.len(), first };
-    sweep.run::<K>(pairs.h, pairs.instructions, &mut Shepard { field, first, at_walls });
+    sweep.run::<K>(pairs.h, pairs.instructions, &mut Shepard { material, first, walls });
 }
 
 struct Shepard<'a, F> {
-    field: &'a [F],
+    material: &'a [F],
     first: usize,
-    at_walls: &'a mut [F],
+    walls: &'a mut [F],
 }
 
 impl<const D: usize, F: Parts<Number = f64>> Sums<D, f64> for Shepard<'_, F> {
@@ -38,12 +34,12 @@ impl<const D: usize, F: Parts<Number = f64>> Sums<D, f64> for Shepard<'_, F> {
         let mut sum: F::With<L> = block.zero();
         for pair in pairs {
             let weight = pair.value * block.same(pair.other.weight);
-            let value = block.all(&self.field[pair.j]);
+            let value = block.all(&self.material[pair.j]);
             weights = weights + weight;
             sum = Parts::from_parts(|k| value.part(k).multiply_add(weight, sum.part(k)));
         }
         // 0/smallest where no material is in reach.
         let weights = weights.largest(block.number(f64::MIN_POSITIVE));
-        block.put_from(self.first, self.at_walls, Parts::from_parts(|k| sum.part(k).over(weights)));
+        block.put_from(self.first, self.walls, Parts::from_parts(|k| sum.part(k).over(weights)));
     }
 }
