@@ -194,8 +194,8 @@ fn middle(launches: &[Launch]) -> &Launch {
 }
 
 fn peers(text: &mut String, main: f64) {
-    *text += "\n## Beside other programs\n\nTheir rates on one core, measured before with the programs as published and on a machine \
-              of about this kind. No two of them compute the same: a ratio says how much material moves in a second of \
+    *text += "\n## Beside other programs\n\nTheir rates on one core, measured before with the programs as published and on an AMD Zen 5 \
+              server: another processor is faster or slower by itself. No two of them compute the same: a ratio says how much material moves in a second of \
               computing, not who solves a problem best.\n\n\
               | program | case | what differs | rate | `main` over it |\n|---|---|---|---|---|\n";
     for Peer { name, case, differs, rate } in &PEERS {
