@@ -138,8 +138,9 @@ impl<const D: usize> Neighbors<D> {
             Precision::Mixed => size_of::<f32>(),
         });
         // Number the particles in ascending key. Cells hold these numbers, so that a list is sorted as plain integers.
-        let mut by_key: Vec<u32> = (0..particles.len() as u32).collect();
-        by_key.sort_unstable_by_key(|&i| particles.key[i as usize]);
+        let mut keyed: Vec<_> = particles.key.iter().copied().zip(0_u32..).collect();
+        keyed.sort_unstable();
+        let by_key: Vec<u32> = keyed.into_iter().map(|(_, i)| i).collect();
         let mut cells = Cells::new(&particles.x, &by_key, 0.5 * reach);
         let (x, by_key) = (&particles.x, &by_key[..]);
         let lists = &mut self.of_owned;

@@ -22,8 +22,11 @@ use crate::sweep::Pairs;
 use formats::h5::Communicator;
 use formats::scene::{Scene, WallLattice};
 
-/// Skin of the neighbour lists over the smoothing length: lists serve until a particle moved half of it.
+/// Skin of the neighbour lists over the smoothing length: lists serve until a particle moved half of it. Thicker lists take
+/// longer to go through and more memory, so it grows only where the thin ones would not serve for [`SERVE`] steps.
 const SKIN: f64 = 0.3;
+const THICKEST: f64 = 0.6;
+const SERVE: f64 = 16.0;
 
 /// Fixed numbers of a run.
 #[derive(Clone, Copy, Debug)]
@@ -173,6 +176,14 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         simulation.settle();
         simulation.fill(Fields::Stress);
         simulation
+    }
+
+    /// Chooses the skin of the next lists, when no particle goes further than `farthest` in a step.
+    pub fn choose_skin(&mut self, farthest: f64) {
+        let h = self.parameters.h;
+        // Scenes with a period are only long enough for the thin one.
+        let thickest = if self.periods.are_none() { THICKEST } else { SKIN };
+        self.parameters.skin = (2.0 * SERVE * farthest).clamp(SKIN * h, thickest * h);
     }
 
     /// Shares the particles out anew if the load has shifted, sends them home, and builds halo, boundaries and lists.

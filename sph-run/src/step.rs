@@ -39,6 +39,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.neighbors.moved(plan.farthest);
         if plan.lists_go_stale {
             self.watch.enter(Phase::Lists);
+            self.choose_skin(plan.farthest);
             self.rebuild();
         } else {
             self.refresh_volumes();

@@ -42,6 +42,11 @@ impl<const D: usize> Periods<D> {
         x
     }
 
+    /// Does the scene repeat itself along no axis?
+    pub fn are_none(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// Shifts from a particle to its copies, the particle itself first: three places along every periodic axis.
     pub fn shifts(&self) -> Vec<Vector<D>> {
         // -0 changes no bit of what it is added to.
