@@ -14,7 +14,8 @@ use std::ops::{Add, Mul, Neg, Sub};
 /// Instructions for lanes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Instructions {
-    /// 8 lanes of f64, 16 of f32 (the level x86-64-v4).
+    /// 8 lanes of f64 or f32 (the level x86-64-v4). Blocks of 16 would look at more candidates for each particle, and gain
+    /// nothing in f32 where registers are computed by halves.
     Avx512,
     /// 4 lanes of f64, 8 of f32 (x86-64-v3).
     Avx2,
@@ -46,7 +47,7 @@ impl Instructions {
     /// Particles of a block: lanes of numbers of `size` bytes.
     pub fn block(self, size: usize) -> usize {
         match self {
-            Self::Avx512 => 64 / size,
+            Self::Avx512 => 8,
             Self::Avx2 | Self::Portable => 32 / size,
         }
     }
@@ -54,7 +55,37 @@ impl Instructions {
     /// Runs a job compiled for these instructions.
     #[inline(always)]
     pub fn run<J: WithSimd>(self, job: J) -> J::Output {
-        self.arch().expect("instructions were checked when they were chosen").dispatch(job)
+        self.arch().expect(CHECKED).dispatch(job)
+    }
+
+    /// As [`Instructions::run`], in registers of 256 bits at most.
+    #[inline(always)]
+    fn run_narrow<J: WithSimd>(self, job: J) -> J::Output {
+        #[cfg(target_arch = "x86_64")]
+        if self == Self::Avx512 {
+            // AVX-512 has twice as many registers as AVX2, also narrow ones.
+            let all = pulp::x86::V4::try_new().expect(CHECKED);
+            return all.vectorize(Narrow { token: *all, job });
+        }
+        self.run(job)
+    }
+}
+
+const CHECKED: &str = "instructions were checked when they were chosen";
+
+#[cfg(target_arch = "x86_64")]
+struct Narrow<J> {
+    token: pulp::x86::V3,
+    job: J,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl<J: WithSimd> pulp::NullaryFnOnce for Narrow<J> {
+    type Output = J::Output;
+
+    #[inline(always)]
+    fn call(self) -> J::Output {
+        self.job.with_simd(self.token)
     }
 }
 
@@ -80,6 +111,8 @@ pub trait Element: Part + Debug + Default + Send + Sync + 'static {
     fn unit(h: f64) -> f64;
     /// The particles in such numbers.
     fn movers<const D: usize>(neighbors: &Neighbors<D>) -> &[Mover<D, Self>];
+    /// Runs a job with blocks of [`Instructions::block`].
+    fn run<J: WithSimd>(instructions: Instructions, job: J) -> J::Output;
     fn of(x: f64) -> Self;
     fn wide(self) -> f64;
 }
@@ -108,6 +141,9 @@ impl<const D: usize> Place<D, f32> for [Vector<D, f32>; 2] {
 
 /// Points of the grid of places in f32, to a unit of length. Differences between points are exact up to 2^20 units.
 const GRID: f64 = 16.0;
+
+/// Added and taken away again it leaves the nearest whole number: `round` is a function that is called.
+const TO_WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
 
 /// One number for each particle of a block.
 pub trait Lanes: Part + Debug {
@@ -142,7 +178,7 @@ fn estimate(x: f32) -> f32 {
 
 macro_rules! lanes {
     ($name:ident, $element:ty, $lanes:ident, $count:ident, $splat:ident, $add:ident, $sub:ident, $mul:ident, $neg:ident,
-     $fma:ident, $div:ident, $min:ident, $max:ident, $less:ident, $first:ident, $refined:literal, $place:ty, $at:expr, $unit:expr, $movers:ident) => {
+     $fma:ident, $div:ident, $min:ident, $max:ident, $less:ident, $first:ident, $refined:literal, $place:ty, $at:expr, $unit:expr, $movers:ident, $run:ident) => {
         /// Lanes of the instructions S.
         #[derive(Clone, Copy, Debug)]
         pub struct $name<S: Simd>(S, S::$lanes);
@@ -265,6 +301,10 @@ macro_rules! lanes {
                 &neighbors.$movers
             }
             #[inline(always)]
+            fn run<J: WithSimd>(instructions: Instructions, job: J) -> J::Output {
+                instructions.$run(job)
+            }
+            #[inline(always)]
             fn of(x: f64) -> Self {
                 x as Self
             }
@@ -308,7 +348,8 @@ lanes!(
     Vector<D>,
     |x: Vector<D>, _| x,
     |_| 1.0,
-    movers
+    movers,
+    run
 );
 lanes!(
     Singles,
@@ -329,11 +370,15 @@ lanes!(
     false,
     [Vector<D, f32>; 2],
     |x: Vector<D>, unit: f64| {
-        let parts = x.0.map(|x| (x / unit, (x / unit * GRID).round() / GRID));
-        [Vector(parts.map(|(_, point)| point as f32)), Vector(parts.map(|(x, point)| (x - point) as f32))]
+        let parts = x.0.map(|x| {
+            let (x, point) = (x / unit, (x / unit * GRID + TO_WHOLE) - TO_WHOLE);
+            (point / GRID, x - point / GRID)
+        });
+        [Vector(parts.map(|(point, _)| point as f32)), Vector(parts.map(|(_, rest)| rest as f32))]
     },
     |h| h,
-    singles
+    singles,
+    run_narrow
 );
 
 /// A field's value, number by number: so it can be had of one particle in all lanes, or of one particle in each.

@@ -410,8 +410,8 @@ pub fn blocks_order<const D: usize>(x: &[Vector<D>]) -> Vec<u32> {
     places.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Lanes of f32 in AVX-512.
-const LARGEST_BLOCK: usize = 16;
+/// See [`Instructions::block`].
+const LARGEST_BLOCK: usize = 8;
 
 fn halve<const D: usize>(places: &mut [(Vector<D>, u32)]) {
     if places.len() < 2 {

@@ -355,7 +355,7 @@ impl<const D: usize, T: Element> Sweep<'_, D, T> {
     /// Calls [`Sums::block`] for every block. `h`: smoothing length in the movers' unit.
     pub fn run<K: Kernel>(self, h: f64, instructions: Instructions, sums: &mut impl Sums<D, T>) {
         let scales = Scales::new(h);
-        instructions.run(Run::<'_, D, T, K, _> { sweep: self, scales, sums, kernel: PhantomData });
+        T::run(instructions, Run::<'_, D, T, K, _> { sweep: self, scales, sums, kernel: PhantomData });
     }
 }
 
