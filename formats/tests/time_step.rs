@@ -1,4 +1,4 @@
-//! Courant numbers a scene may ask for.
+//! Courant numbers a scene may ask for, and those it gets.
 
 use formats::scene::Scene;
 
@@ -32,4 +32,36 @@ fn corrected_gradients_need_shorter_steps() {
         let message = refused("axisymmetric", "cubic-spline", correction, 0.7).expect("too long");
         assert!(message.contains("(0, 0.69]") && message.contains("hoop"), "{message}");
     }
+}
+
+/// As long as the study `time-step` of VALIDATION.md supports, and shorter where something else limits it.
+#[test]
+fn the_default_depends_on_what_limits_the_step() {
+    let sand = "[material.drucker-prager]\nyoung = 1e6\npoisson = 0.3\nfriction = 30\ncohesion = 0\n";
+    let grains = "[material.mu-i]\nsound-speed = 10\nfriction-static = 0.4\n";
+    let mud =
+        "[material.visco-plastic]\nsound-speed = 10\nfriction = 30\ncohesion = 0\nviscosity = 0\nviscosity-solid = 1\n";
+    let default = |space: &str, law: &str, more: &str| {
+        let text = format!(
+            "space = \"{space}\"\nspacing = 0.01\n{law}density = 2600\n[body.block]\n\
+             box = {{ min = [0, 0, 0], max = [0.1, 0.1, 0.1] }}\n{more}[end]\ntime = 1\n"
+        );
+        Scene::read("scene.toml", &text).expect("a sound scene").numerics.courant
+    };
+    let with = |keys: &str| default("3d", sand, &format!("[numerics]\n{keys}\n"));
+    for space in ["plane-strain", "3d"] {
+        assert_eq!([sand, grains, mud].map(|law| default(space, law, "")), [1.0, 0.6, 0.6]);
+    }
+    assert_eq!(default("axisymmetric", sand, ""), 0.6);
+    let wide = default("axisymmetric", sand, "[kernel]\nkind = \"wendland-c2\"\n");
+    assert!((wide - 0.8 * 0.6017).abs() < 1e-3, "{wide}");
+    // Measured stable where the product with the strength is 0.30, and not at 0.36.
+    assert_eq!(
+        ["stress-diffusion = 1", "density-diffusion = 0.5", "stress-diffusion = 0.1"].map(with),
+        [0.25, 0.5, 1.0]
+    );
+    assert_eq!(
+        ["viscosity = 1", "viscosity = 0.5", "gradient-correction = \"variational\""].map(with),
+        [0.6, 1.0, 0.6]
+    );
 }

@@ -98,11 +98,6 @@ impl<const D: usize> Neighbors<D> {
         }
     }
 
-    /// Gives back the memory of what is made anew before the next sweep.
-    pub fn release(&mut self) {
-        (self.movers, self.singles, self.near) = (Vec::new(), Vec::new(), Lists::default());
-    }
-
     /// Says that particles have moved, none further than `farthest`.
     pub fn moved(&mut self, farthest: f64) {
         self.moved += farthest;

@@ -2,6 +2,7 @@
 //! people, and the log of the machine's doings.
 
 use crate::error::RunError;
+use crate::neighbors::Neighbors;
 use crate::parallel::gather;
 use crate::physics::Physics;
 use crate::report;
@@ -38,9 +39,10 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 
     /// This rank's share of all particles, in ascending id. Collective.
     pub fn rows(&mut self) -> Rows {
-        // What lives within a step makes room for them.
+        // What lives within a step makes room for them, and so do the lists: the next step builds them anew.
         self.buffers = Buffers::default();
-        self.neighbors.release();
+        self.neighbors = Neighbors::default();
+        self.x_build = Vec::new();
         let mut rows = gather::rows::<D, N, P::Space>(self.comm, &self.particles, self.parameters.count);
         // Between builds of the lists particles may lie beyond a periodic border; when that is must not show.
         for x in &mut rows.position {

@@ -35,6 +35,8 @@ axis = "x"
 at = "0.25 m"
 side = "below"
 slip = "free-slip"
+[numerics]
+courant = 0.6
 [end]
 time = "80 ms"
 [output]
@@ -67,6 +69,8 @@ symmetry = ["x", "y"]
 [body.column]
 cylinder = { radius = "0.1 m", height = "0.15 m" }
 velocity = ["0.8 m/s", "0.3 m/s", 0]
+[numerics]
+courant = 0.6
 [end]
 time = "80 ms"
 [output]
@@ -193,6 +197,8 @@ box = { min = [0, 0, 0], max = ["0.2 m", 0, "0.15 m"] }
 velocity = ["1.5 m/s", 0, 0]
 [initial]
 jitter = 0.05
+[numerics]
+courant = 0.6
 [end]
 time = "80 ms"
 [output]
@@ -214,6 +220,8 @@ at = "0.25 m"
 side = "below"
 slip = "free-slip"
 kind = "mirror"
+[numerics]
+courant = 0.6
 [end]
 time = "80 ms"
 [output]
@@ -239,6 +247,8 @@ kind = "mirror"
 velocity = [0, 0, "0.4 m/s"]
 [initial]
 jitter = 0.05
+[numerics]
+courant = 0.6
 [end]
 time = "80 ms"
 [output]

@@ -39,6 +39,8 @@ axis = "x"
 at = "0.26 m"
 side = "below"
 slip = "free-slip"
+[numerics]
+courant = 0.6
 [end]
 time = "150 ms"
 [output]
@@ -93,6 +95,8 @@ axis = "z"
 at = "0 m"
 side = "above"
 slip = "no-slip"
+[numerics]
+courant = 0.6
 [end]
 time = "150 ms"
 [output]
