@@ -137,8 +137,9 @@ impl Job for Parts<'_> {
         owned.own(owned.owned);
         group.bench_function(named("halo plan"), |bencher| {
             let plan = |mut particles: Particles<D, N>| {
-                let shifts = run.periods.shifts();
-                black_box(Halo::plan(self.comm, &mut particles, shifts, |_| reach, reach));
+                let mut halo = Halo::plan(self.comm, &particles.x, run.periods.shifts(), |_| reach, reach);
+                halo.create(self.comm, &mut particles);
+                black_box(halo);
                 // Freeing it is not measured.
                 particles
             };

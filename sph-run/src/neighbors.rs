@@ -78,8 +78,12 @@ pub struct Neighbors<const D: usize> {
     pub of_owned: Lists,
     /// Of the candidates of owned particles those within the support, and a little more.
     near: Lists,
+    /// How many of the particles have it.
+    found: usize,
     /// How far particles may have gone since, m.
     moved: f64,
+    /// The first so many of the owned particles have no candidates but owned ones.
+    alone: usize,
     /// For the wall particles: material particles of all ranges but the walls.
     pub of_wall: Lists,
 }
@@ -92,10 +96,25 @@ impl<const D: usize> Neighbors<D> {
 
     /// As [`Neighbors::refresh`], of the particles from index `first` on.
     pub fn refresh_from<const N: usize, K: Kernel>(&mut self, first: usize, particles: &Particles<D, N>, pairs: Pairs) {
-        movers::<D, N, K, f64>(first, particles, pairs.h, &mut self.movers);
+        self.refresh_part::<N, K>(first..particles.len(), particles, pairs);
+    }
+
+    /// As [`Neighbors::refresh`], of the particles of a part; later ones are forgotten.
+    pub fn refresh_part<const N: usize, K: Kernel>(
+        &mut self,
+        part: Range<usize>,
+        particles: &Particles<D, N>,
+        pairs: Pairs,
+    ) {
+        movers::<D, N, K, f64>(part.clone(), particles, pairs.h, &mut self.movers);
         if pairs.precision == Precision::Mixed {
-            movers::<D, N, K, f32>(first, particles, pairs.h, &mut self.singles);
+            movers::<D, N, K, f32>(part, particles, pairs.h, &mut self.singles);
         }
+    }
+
+    /// How many of the owned particles, from the first on and in whole blocks, need no others until the next build.
+    pub fn alone(&self) -> usize {
+        self.alone
     }
 
     /// Says that particles have moved, none further than `farthest`.
@@ -105,11 +124,20 @@ impl<const D: usize> Neighbors<D> {
 
     /// Finds what is within the support, if what was found before no longer holds: sweeps go over it.
     pub fn find(&mut self, x: &[Vector<D>], pairs: Pairs) {
+        self.find_first(self.of_owned.len(), x, pairs);
+    }
+
+    /// As [`Neighbors::find`], at least for the first `end` owned particles, in whole blocks; [`Neighbors::find`] finds the rest.
+    pub fn find_first(&mut self, end: usize, x: &[Vector<D>], pairs: Pairs) {
         let margin = MARGIN * pairs.h;
-        if self.near.len() != self.of_owned.len() || self.moved > 0.5 * margin {
-            let (lists, near) = (&self.of_owned, &mut self.near);
-            pairs.instructions.run(Find { lists, near, x, support: 2.0 * pairs.h + margin });
-            self.moved = 0.0;
+        if self.moved > 0.5 * margin {
+            self.near.clear(self.of_owned.count, self.of_owned.block);
+            (self.found, self.moved) = (0, 0.0);
+        }
+        if self.found < end {
+            let (lists, near, part) = (&self.of_owned, &mut self.near, self.found..end);
+            pairs.instructions.run(Find { lists, near, part, x, support: 2.0 * pairs.h + margin });
+            self.found = end;
         }
     }
 
@@ -140,6 +168,8 @@ impl<const D: usize> Neighbors<D> {
         let (x, by_key) = (&particles.x, &by_key[..]);
         let lists = &mut self.of_owned;
         instructions.run(Build { lists, cells: &cells, x: &x[..particles.owned], by_key, reach, block });
+        let owned = |list: &[u32]| list.iter().all(|&j| (j as usize) < particles.owned);
+        self.alone = lists.blocks().take_while(|(_, list)| owned(list)).last().map_or(0, |(block, _)| block.end);
         cells.forget(particles.mirror, by_key);
         let lists = &mut self.of_wall;
         instructions.run(Build { lists, cells: &cells, x: &x[particles.mirror..], by_key, reach, block });
@@ -150,6 +180,8 @@ impl<const D: usize> Neighbors<D> {
 struct Find<'a, const D: usize> {
     lists: &'a Lists,
     near: &'a mut Lists,
+    /// Which of the particles; the lists of those before are there.
+    part: Range<usize>,
     x: &'a [Vector<D>],
     support: f64,
 }
@@ -159,15 +191,14 @@ impl<const D: usize> WithSimd for Find<'_, D> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, token: S) {
-        let Self { lists, near, x, support } = self;
-        near.clear(lists.count, lists.block);
+        let Self { lists, near, part, x, support } = self;
         // A little more, lest the f32 of mixed precision miss any: there the kernel is zero all the same.
         let support2 = Doubles::all(token, support * support * (1.0 + 1e-5));
         match lists.block / Doubles::<S>::LANES {
-            1 => find::<D, S, 1>(token, lists, near, x, support2),
-            2 => find::<D, S, 2>(token, lists, near, x, support2),
-            4 => find::<D, S, 4>(token, lists, near, x, support2),
-            8 => find::<D, S, 8>(token, lists, near, x, support2),
+            1 => find::<D, S, 1>(token, lists, near, part, x, support2),
+            2 => find::<D, S, 2>(token, lists, near, part, x, support2),
+            4 => find::<D, S, 4>(token, lists, near, part, x, support2),
+            8 => find::<D, S, 8>(token, lists, near, part, x, support2),
             registers => unreachable!("blocks of {registers} registers"),
         }
     }
@@ -179,10 +210,11 @@ fn find<const D: usize, S: Simd, const R: usize>(
     token: S,
     lists: &Lists,
     near: &mut Lists,
+    part: Range<usize>,
     x: &[Vector<D>],
     support2: Doubles<S>,
 ) {
-    for (block, candidates) in lists.blocks() {
+    for (block, candidates) in lists.blocks_of(part) {
         let last = block.end - 1;
         let mut own: [Vector<D, Doubles<S>>; R] = [Vector::from_parts(|_| support2); R];
         for (r, own) in own.iter_mut().enumerate() {
@@ -222,15 +254,15 @@ fn is_near<const D: usize, S: Simd>(
 }
 
 fn movers<const D: usize, const N: usize, K: Kernel, T: Element>(
-    first: usize,
+    part: Range<usize>,
     p: &Particles<D, N>,
     h: f64,
     movers: &mut Vec<Mover<D, T>>,
 ) {
     let unit = T::unit(h);
     let per_volume = weight::<D, K>(h, unit);
-    movers.truncate(first);
-    movers.extend((first..p.len()).map(|i| Mover::new(p.x[i], p.v[i], p.volume[i] * per_volume, unit)));
+    movers.truncate(part.start);
+    movers.extend(part.map(|i| Mover::new(p.x[i], p.v[i], p.volume[i] * per_volume, unit)));
 }
 
 /// Lists for blocks of the particles at `x`.
@@ -403,6 +435,17 @@ pub fn blocks_order<const D: usize>(x: &[Vector<D>]) -> Vec<u32> {
     let mut places: Vec<(Vector<D>, u32)> = x.iter().copied().zip(0..).collect();
     halve(&mut places);
     places.into_iter().map(|(_, i)| i).collect()
+}
+
+/// An order of particles in which whole blocks that need nothing of others are first; the blocks stay as they are.
+pub fn needing_last(needs: &[bool]) -> Vec<u32> {
+    let blocks = || needs.chunks(LARGEST_BLOCK).enumerate();
+    // One that is not full can only be the last.
+    let alone = |block: &[bool]| block.len() == LARGEST_BLOCK && !block.contains(&true);
+    let first = blocks().filter(|(_, block)| alone(block));
+    let last = blocks().filter(|(_, block)| !alone(block));
+    let start = |k: usize| (k * LARGEST_BLOCK) as u32;
+    first.chain(last).flat_map(|(k, block)| start(k)..start(k) + block.len() as u32).collect()
 }
 
 /// See [`Instructions::block`].

@@ -7,7 +7,7 @@ use crate::boundary::periodic::Periods;
 use crate::boundary::wall::Walls;
 use crate::lanes::Instructions;
 use crate::material::Material as _;
-use crate::neighbors::{Neighbors, blocks_order};
+use crate::neighbors::{Neighbors, blocks_order, needing_last};
 use crate::parallel::halo::{Fields, Halo};
 use crate::parallel::migrate;
 use crate::parallel::orb::Tree;
@@ -207,33 +207,60 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         migrate::owners::<D, N, P::Space>(self.comm, &self.partition.tree, &mut self.particles);
         let (h, skin) = (self.parameters.h, self.parameters.skin);
         let reach = 2.0 * h + skin;
-        let order = blocks_order(&self.particles.x);
-        self.particles.arrange(&order);
         self.partition.planned.get_or_insert(self.particles.owned as u64);
-        self.x_build.clone_from(&self.particles.x);
-
         // A particle near a wall is needed twice as far: by the wall particles that others see.
         let beside_wall = if self.walls.has_sites() { 2.0 * reach } else { reach };
         let walls = self.walls.clone();
         let reach_of = |x: Vector<D>| {
             if walls.distance_of_sites::<D, N, P::Space>(x) < reach { beside_wall } else { reach }
         };
+        let order = blocks_order(&self.particles.x);
+        let x: Vec<Vector<D>> = order.iter().map(|&i| self.particles.x[i as usize]).collect();
+        let halo = &mut self.partition.halo;
+        *halo = Halo::plan(self.comm, &x, self.periods.shifts(), reach_of, beside_wall);
+        let mut needs = vec![false; x.len()];
+        if halo.has_peers() {
+            // Who may have neighbours among copies, images or walls goes last: the others need not wait for them.
+            let near = |x| self.mirrors.are_near(x, reach) || walls.distance_of_sites::<D, N, P::Space>(x) < reach;
+            needs = x.iter().map(|&x| near(x)).collect();
+            halo.needed(|i| needs[i] = true);
+        }
+        let last = needing_last(&needs);
+        halo.renumber(&last);
+        self.particles.arrange(&last.iter().map(|&k| order[k as usize]).collect::<Vec<_>>());
+        self.x_build.clone_from(&self.particles.x);
         self.refresh_volumes();
-        let shifts = self.periods.shifts();
-        self.partition.halo = Halo::plan(self.comm, &mut self.particles, shifts, reach_of, beside_wall);
-        self.partition.halo.fill(self.comm, &mut self.particles, Fields::Motion);
+        let halo = &mut self.partition.halo;
+        halo.create(self.comm, &mut self.particles);
+        halo.fill(self.comm, &mut self.particles, Fields::Motion);
         self.mirrors.create(&mut self.particles, reach_of);
         self.mirrors.fill(&mut self.particles, Fields::Motion);
         self.walls.create::<D, N, P::Space>(&mut self.particles, reach);
         self.neighbors.build(&self.particles, reach, self.parameters.pairs);
-        self.reflect_motion();
+        self.reflect_motion(0);
     }
 
-    /// Velocities of wall particles, from the material around them; then sweeps can begin.
-    fn reflect_motion(&mut self) {
+    /// How many of the owned particles, from the first on and in whole blocks, can be computed while others are on their
+    /// way; none where nothing is under way.
+    pub fn ahead(&self) -> usize {
+        if self.partition.halo.has_peers() { self.neighbors.alone() } else { 0 }
+    }
+
+    /// What sweeps over the first `end` owned particles need, when those have no neighbours but owned ones.
+    pub fn support_first(&mut self, end: usize) {
+        let before = self.watch.enter(Phase::Support);
+        let (p, pairs) = (&self.particles, self.parameters.pairs);
+        self.neighbors.refresh_part::<N, P::Kernel>(0..p.owned, p, pairs);
+        self.neighbors.find_first(end, &p.x, pairs);
+        self.watch.enter(before);
+    }
+
+    /// Velocities of wall particles, from the material around them; then sweeps can begin. The first `known` particles are
+    /// laid out already.
+    fn reflect_motion(&mut self, known: usize) {
         let before = self.watch.enter(Phase::Support);
         let (p, pairs) = (&mut self.particles, self.parameters.pairs);
-        self.neighbors.refresh::<N, P::Kernel>(p, pairs);
+        self.neighbors.refresh_from::<N, P::Kernel>(known, p, pairs);
         if self.walls.has_sites() {
             self.watch.enter(Phase::Walls);
             self.walls.fill_motion::<D, N, P::Space, P::Kernel>(p, &self.neighbors, pairs);
@@ -247,13 +274,25 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
     /// Brings everything around the owned particles up to date, in the one order that is right: halo, then images of
     /// owned and halo, then walls, which see all three.
     pub fn fill(&mut self, fields: Fields) {
+        self.fill_while(fields, |_| 0);
+    }
+
+    /// As [`Simulation::fill`], and something else while copies are on their way, of owned particles that need none of them. It
+    /// returns how many of the owned particles it laid out for the sweeps.
+    pub fn fill_while(&mut self, fields: Fields, meanwhile: impl FnOnce(&mut Self) -> usize) {
         let before = self.watch.enter(Phase::Halo);
-        let p = &mut self.particles;
-        self.partition.halo.fill(self.comm, p, fields);
+        let mut halo = std::mem::take(&mut self.partition.halo);
+        halo.pack_all(&mut self.particles, fields);
+        let mut known = 0;
+        halo.send(self.comm, || known = meanwhile(self));
+        self.watch.enter(Phase::Halo);
+        halo.unpack_all(&mut self.particles, fields);
+        self.partition.halo = halo;
         self.watch.enter(Phase::Walls);
+        let p = &mut self.particles;
         self.mirrors.fill(p, fields);
         match fields {
-            Fields::Motion => self.reflect_motion(),
+            Fields::Motion => self.reflect_motion(known),
             Fields::Stress => {
                 self.walls.fill_stress::<D, N, P::Space, P::Kernel>(p, &self.neighbors, self.parameters.pairs);
             }

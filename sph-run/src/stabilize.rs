@@ -45,6 +45,11 @@ impl Stabilisers {
             shifting: numerics.shifting,
         }
     }
+
+    /// Does anything need copies between the drift and the strain?
+    pub fn before_the_strain(&self) -> bool {
+        self.gradient_correction || self.density_diffusion > 0.0 || self.stress_diffusion > 0.0
+    }
 }
 
 /// Fields that live within a step; kept between steps for their memory only.

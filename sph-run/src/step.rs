@@ -5,6 +5,7 @@
 use crate::algebra::{Matrix, Vector};
 use crate::lanes::{Element, Parts};
 use crate::material::{Increment, Material, gated};
+use crate::parallel::exchange::look_after;
 use crate::parallel::halo::Fields;
 use crate::phases::Phase;
 use crate::physics::Physics;
@@ -27,7 +28,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     /// first strain. Collective.
     pub fn begin(&mut self) {
         self.refresh_correction();
-        self.accelerate();
+        self.accelerate(0);
     }
 
     /// Advances by the planned step. Collective.
@@ -37,13 +38,17 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.kick(0.5 * dt);
         self.drift(dt);
         self.neighbors.moved(plan.farthest);
+        let mut strained = 0;
         if plan.lists_go_stale {
             self.watch.enter(Phase::Lists);
             self.choose_skin(plan.farthest);
             self.rebuild();
         } else {
             self.refresh_volumes();
-            self.fill(Fields::Motion);
+            // What corrects or diffuses comes before the strain, and needs copies.
+            let ahead = if self.parameters.stabilisers.before_the_strain() { 0 } else { self.ahead() };
+            self.fill_while(Fields::Motion, |run| run.strain_ahead(ahead, dt));
+            strained = ahead;
         }
         if self.parameters.stabilisers.stress_diffusion > 0.0 {
             // New copies have none yet; and what crossed a plane of symmetry turned its own around.
@@ -52,13 +57,14 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.watch.enter(Phase::Stabilisers);
         self.refresh_correction();
         self.diffuse();
-        self.watch.enter(Phase::Gradient);
-        self.update_stress(dt);
-        self.fill(Fields::Stress);
+        self.update_stress(strained..self.particles.owned, dt);
+        self.refresh_volumes();
+        let ahead = self.ahead();
+        self.fill_while(Fields::Stress, |run| run.push_ahead(ahead));
         self.watch.enter(Phase::Stabilisers);
         self.fill_viscosity();
         self.watch.enter(Phase::Acceleration);
-        self.accelerate();
+        self.accelerate(ahead);
         self.heat(dt);
         self.watch.enter(Phase::Motion);
         self.kick(0.5 * dt);
@@ -87,12 +93,22 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.mirrors.keep_inside(p);
     }
 
-    /// Density and stress of the owned particles, from the velocity gradient.
-    fn update_stress(&mut self, dt: f64) {
-        let owned = self.particles.owned;
-        for first in (0..owned).step_by(PART) {
+    /// Lays out the owned particles and strains the first `ahead` of them. Returns how many are laid out.
+    fn strain_ahead(&mut self, ahead: usize, dt: f64) -> usize {
+        if ahead == 0 {
+            return 0;
+        }
+        self.support_first(ahead);
+        self.update_stress(0..ahead, dt);
+        self.particles.owned
+    }
+
+    /// Density and stress of some owned particles, in whole blocks, from the velocity gradient.
+    fn update_stress(&mut self, particles: Range<usize>, dt: f64) {
+        for first in particles.clone().step_by(PART) {
             self.watch.enter(Phase::Gradient);
-            let part = first..(first + PART).min(owned);
+            look_after(self.comm);
+            let part = first..(first + PART).min(particles.end);
             let mut gradient = std::mem::take(&mut self.gradient);
             gradient.resize(part.len(), Matrix::default());
             let (neighbors, pairs) = (&self.neighbors, self.parameters.pairs);
@@ -109,7 +125,6 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             self.strain(part, &gradient, dt);
             self.gradient = gradient;
         }
-        self.refresh_volumes();
     }
 
     /// Density and stress of some owned particles under their velocity gradients.
@@ -143,8 +158,34 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         }
     }
 
-    /// Accelerations of the owned particles, from the stresses around them.
-    fn accelerate(&mut self) {
+    /// Lays out the owned particles and sums the stresses around the first `ahead` of them. Returns how many are laid out.
+    fn push_ahead(&mut self, ahead: usize) -> usize {
+        if ahead == 0 {
+            return 0;
+        }
+        self.watch.enter(Phase::Acceleration);
+        let owned = self.particles.owned;
+        self.push(0..owned, 0..ahead);
+        owned
+    }
+
+    /// Accelerations of the owned particles, from the stresses around them. The first `ahead` have been pushed already.
+    fn accelerate(&mut self, ahead: usize) {
+        let owned = self.particles.owned;
+        let laid_out = if ahead == 0 { 0 } else { owned };
+        self.push(laid_out..self.particles.len(), ahead..owned);
+        let mut a = std::mem::take(&mut self.particles.a);
+        self.accelerate_further(&mut a);
+        let spacing = self.parameters.spacing;
+        let p = &mut self.particles;
+        for (i, a) in a.iter_mut().enumerate() {
+            *a += P::Space::hoop(&p.stress[i], p.density[i], p.x[i], spacing) + self.gravity;
+        }
+        p.a = a;
+    }
+
+    /// Lays out some particles, and sums the stresses around some owned ones.
+    fn push(&mut self, new: Range<usize>, part: Range<usize>) {
         let spacing = self.parameters.spacing;
         let mut a = std::mem::take(&mut self.particles.a);
         let mut buffers = std::mem::take(&mut self.buffers);
@@ -153,22 +194,19 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         let weigh = |i: usize| p.stress[i] * P::Space::metric(p.x[i], spacing);
         let correct = |i: usize| P::Space::matrix(&weigh(i)).product(&correction[i]);
         match (self.parameters.stabilisers.gradient_correction, self.parameters.pairs.precision) {
-            (false, Precision::Double) => self.accelerate_by(weigh, &mut weighted.0, &mut a, heat),
-            (false, Precision::Mixed) => self.accelerate_by(weigh, &mut weighted.1, &mut a, heat),
-            (true, Precision::Double) => self.accelerate_by(correct, &mut corrected.0, &mut a, heat),
-            (true, Precision::Mixed) => self.accelerate_by(correct, &mut corrected.1, &mut a, heat),
+            (false, Precision::Double) => self.push_by(new, part, weigh, &mut weighted.0, &mut a, heat),
+            (false, Precision::Mixed) => self.push_by(new, part, weigh, &mut weighted.1, &mut a, heat),
+            (true, Precision::Double) => self.push_by(new, part, correct, &mut corrected.0, &mut a, heat),
+            (true, Precision::Mixed) => self.push_by(new, part, correct, &mut corrected.1, &mut a, heat),
         }
         self.buffers = buffers;
-        self.accelerate_further(&mut a);
-        let p = &mut self.particles;
-        for (i, a) in a.iter_mut().enumerate() {
-            *a += P::Space::hoop(&p.stress[i], p.density[i], p.x[i], spacing) + self.gravity;
-        }
-        p.a = a;
+        self.particles.a = a;
     }
 
-    fn accelerate_by<F: Traction<D, N, T>, T: Element, G: Parts<Number = f64>>(
+    fn push_by<F: Traction<D, N, T>, T: Element, G: Parts<Number = f64>>(
         &self,
+        new: Range<usize>,
+        part: Range<usize>,
         weighted: impl Fn(usize) -> G,
         stressed: &mut Vec<Stressed<F, T>>,
         a: &mut [Vector<D>],
@@ -177,9 +215,13 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         let (p, parameters) = (&self.particles, &self.parameters);
         let (pairs, viscosity) = (parameters.pairs, parameters.viscosity);
         let per_volume = weight::<D, P::Kernel>(pairs.h, T::unit(pairs.h));
-        Stressed::all::<D, N, P::Space, G>(p, pairs.spacing, per_volume, weighted, stressed);
+        Stressed::part::<D, N, P::Space, G>(new, p, pairs.spacing, per_volume, weighted, stressed);
         heat.resize(p.owned, 0.0);
-        momentum::<D, N, P::Space, P::Kernel, F, T>(p, &self.neighbors, pairs, viscosity, stressed, a, heat);
+        for first in part.clone().step_by(PART) {
+            look_after(self.comm);
+            let some = first..(first + PART).min(part.end);
+            momentum::<D, N, P::Space, P::Kernel, F, T>(some, p, &self.neighbors, pairs, viscosity, stressed, a, heat);
+        }
     }
 
     /// Counts the heat of the viscosity.

@@ -431,6 +431,12 @@ fn compare<const D: usize, const N: usize, P: Physics<D, N>>(
         }
         assert_eq!(next, lists.len(), "{name}: each particle has a list");
     }
+    // Who is computed while copies are on their way needs none of them, nor anything made of them.
+    let ahead = simulation.ahead();
+    let needs_none = |i: usize| simulation.neighbors.of_owned.of(i).iter().all(|&j| (j as usize) < p.owned);
+    assert!((0..ahead).all(needs_none), "{name}: one of the first {ahead} needs others");
+    assert!(ahead == p.owned || ahead.is_multiple_of(4), "{name}: {ahead} are no whole blocks");
+
     let mut seen = [pairs_with_walls as u64, (p.halo - p.owned) as u64, (p.mirror - p.halo) as u64];
     simulation.comm.sum(&mut seen);
     let alone = simulation.comm.size() == 1 && scene.periodic == [None; 3];

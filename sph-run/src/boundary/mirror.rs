@@ -116,6 +116,11 @@ impl<const D: usize, const N: usize> Mirrors<D, N> {
         Self { planes, ways, routes, images: Vec::new() }
     }
 
+    /// Is a place within `reach` of a plane?
+    pub fn are_near(&self, x: Vector<D>, reach: f64) -> bool {
+        self.planes.iter().any(|plane| plane.depth(plane.reflection.place(x)) < reach)
+    }
+
     /// Appends the images of owned and halo particles that lie within `reach(x)` of a plane. Their fields are not filled.
     pub fn create(&mut self, particles: &mut Particles<D, N>, reach: impl Fn(Vector<D>) -> f64) {
         debug_assert_eq!(particles.halo, particles.len());

@@ -24,12 +24,18 @@ pub fn exchange(comm: &Communicator, peers: &[usize], outgoing: &[Vec<u64>]) -> 
     let mut incoming: Vec<Vec<u64>> = incoming_counts.iter().map(|&count| vec![0; count as usize]).collect();
     let (outgoing, incoming_parts): (Vec<&[u64]>, Vec<&mut [u64]>) =
         (outgoing.iter().map(Vec::as_slice).collect(), incoming.iter_mut().map(Vec::as_mut_slice).collect());
-    payloads(comm, peers, &outgoing, incoming_parts);
+    payloads(comm, peers, &outgoing, incoming_parts, || {});
     incoming
 }
 
-/// Sends and receives messages whose lengths both sides know. Empty ones are not sent.
-pub fn payloads(comm: &Communicator, peers: &[usize], outgoing: &[&[u64]], incoming: Vec<&mut [u64]>) {
+/// Sends and receives messages whose lengths both sides know, and does something else `meanwhile`. Empty ones are not sent.
+pub fn payloads(
+    comm: &Communicator,
+    peers: &[usize],
+    outgoing: &[&[u64]],
+    incoming: Vec<&mut [u64]>,
+    meanwhile: impl FnOnce(),
+) {
     request::scope(|scope| {
         let mut receives = Vec::with_capacity(peers.len());
         for (&peer, message) in peers.iter().zip(incoming).filter(|(_, m)| !m.is_empty()) {
@@ -39,9 +45,17 @@ pub fn payloads(comm: &Communicator, peers: &[usize], outgoing: &[&[u64]], incom
         for (&peer, message) in peers.iter().zip(outgoing).filter(|(_, m)| !m.is_empty()) {
             sends.push(comm.process_at_rank(peer as i32).immediate_send(scope, *message));
         }
+        meanwhile();
         wait_all(receives);
         wait_all(sends);
     });
+}
+
+/// Lets the library look after messages under way: many move them on only inside a call.
+pub fn look_after(comm: &Communicator) {
+    if comm.size() > 1 {
+        let _ = comm.any_process().immediate_probe();
+    }
 }
 
 fn wait_all<'a, D: ?Sized, S: Scope<'a>>(requests: Vec<Request<'a, D, S>>) {

@@ -20,6 +20,8 @@ pub struct Halo<const D: usize> {
     shifts: Vec<Vector<D>>,
     /// Number of particles from each peer.
     receive: Vec<usize>,
+    /// Words a particle has in the messages at hand.
+    words: usize,
     outgoing: Vec<u64>,
     incoming: Vec<u64>,
 }
@@ -60,24 +62,23 @@ impl Fields {
 }
 
 impl<const D: usize> Halo<D> {
-    /// Finds the particles each rank needs of the others, and of its own, shifted by one of `shifts`: those within
+    /// Finds which of the particles at `x` each rank needs, and this one, shifted by one of `shifts`: those within
     /// `reach(x)` of the box around its own. `shifts` starts with 0 and holds with every shift its opposite; `reach` is the
-    /// same for a particle and its shifted copies, `widest` its largest value. Appends the halo's keys to `particles`.
-    pub fn plan<const N: usize>(
+    /// same for a particle and its shifted copies, `widest` its largest value. Collective.
+    pub fn plan(
         comm: &Communicator,
-        particles: &mut Particles<D, N>,
+        x: &[Vector<D>],
         shifts: Vec<Vector<D>>,
         reach: impl Fn(Vector<D>) -> f64,
         widest: f64,
     ) -> Self {
-        debug_assert_eq!(particles.owned, particles.len());
-        let boxes = gather_boxes(comm, &particles.x);
+        let boxes = gather_boxes(comm, x);
         let me = comm.rank() as usize;
         let mut halo = Self { shifts, ..Self::default() };
         let Some(mine) = boxes[me] else {
-            return halo.finish(particles, &[]);
+            return halo;
         };
-        let by_reach: Vec<f64> = particles.x.iter().map(|&x| reach(x)).collect();
+        let by_reach: Vec<f64> = x.iter().map(|&x| reach(x)).collect();
         for (rank, bounds) in boxes.iter().enumerate() {
             let Some(theirs) = *bounds else { continue };
             // Asked both ways round, so that two ranks agree on being peers to the last bit.
@@ -92,41 +93,65 @@ impl<const D: usize> Halo<D> {
             let mut copies = Vec::new();
             for (number, &shift) in halo.shifts.iter().enumerate().skip(others) {
                 let near = |&i: &u32| {
-                    let (x, reach) = (particles.x[i as usize] + shift, by_reach[i as usize]);
+                    let (x, reach) = (x[i as usize] + shift, by_reach[i as usize]);
                     gap2(&(x, x), &theirs) < reach * reach
                 };
-                let near = (0..particles.owned as u32).filter(near);
+                let near = (0..x.len() as u32).filter(near);
                 copies.extend(near.map(|source| Copied { source, shift: number as u32 }));
             }
             halo.peers.push(rank);
             halo.send.push(copies);
         }
-        let keys: Vec<Vec<u64>> = halo
-            .send
-            .iter()
-            .map(|list| list.iter().map(|copy| particles.key[copy.source as usize]).collect())
-            .collect();
-        let incoming = exchange(comm, &halo.peers, &keys);
-        halo.finish(particles, &incoming)
+        halo
     }
 
-    fn finish<const N: usize>(mut self, particles: &mut Particles<D, N>, keys: &[Vec<u64>]) -> Self {
-        self.receive = keys.iter().map(Vec::len).collect();
-        particles.key.extend(keys.iter().flatten());
+    /// Is there anyone to exchange with?
+    pub fn has_peers(&self) -> bool {
+        !self.peers.is_empty()
+    }
+
+    /// Calls `visit` with each particle that someone needs, once for each copy.
+    pub fn needed(&self, mut visit: impl FnMut(usize)) {
+        self.send.iter().flatten().for_each(|copied| visit(copied.source as usize));
+    }
+
+    /// Says that particle `order[k]` is now particle k.
+    pub fn renumber(&mut self, order: &[u32]) {
+        let mut now = vec![0; order.len()];
+        for (k, &before) in order.iter().enumerate() {
+            now[before as usize] = k as u32;
+        }
+        for copied in self.send.iter_mut().flatten() {
+            copied.source = now[copied.source as usize];
+        }
+    }
+
+    /// Tells the others the keys of their copies, and appends those of this rank's to `particles`. Collective.
+    pub fn create<const N: usize>(&mut self, comm: &Communicator, particles: &mut Particles<D, N>) {
+        debug_assert_eq!(particles.owned, particles.len());
+        let key = |copied: &Copied| particles.key[copied.source as usize];
+        let keys: Vec<Vec<u64>> = self.send.iter().map(|list| list.iter().map(key).collect()).collect();
+        let incoming = exchange(comm, &self.peers, &keys);
+        self.receive = incoming.iter().map(Vec::len).collect();
+        particles.key.extend(incoming.iter().flatten());
         particles.halo = particles.key.len();
         particles.mirror = particles.halo;
         particles.resize(particles.halo);
-        self
     }
 
     /// Refreshes the copies.
     pub fn fill<const N: usize>(&mut self, comm: &Communicator, p: &mut Particles<D, N>, fields: Fields) {
+        self.pack_all(p, fields);
+        self.send(comm, || {});
+        self.unpack_all(p, fields);
+    }
+
+    /// Writes the messages that refresh the copies.
+    pub fn pack_all<const N: usize>(&mut self, p: &mut Particles<D, N>, fields: Fields) {
         // A message has all of one field, then all of the next.
         let mut words = 0;
         fields.visit(p, |field| words += count(&field));
-        self.outgoing.resize(self.send.iter().map(Vec::len).sum::<usize>() * words, 0);
-        self.incoming.resize(self.receive.iter().sum::<usize>() * words, 0);
-
+        self.make_room(words);
         let mut before = 0;
         fields.visit(p, |field| {
             let here = before;
@@ -138,9 +163,11 @@ impl<const D: usize> Halo<D> {
                 Field::Stress(field) => self.pack(words, here, field, |stress, _| stress),
             }
         });
+    }
 
-        self.send(comm, words);
-
+    /// Reads them.
+    pub fn unpack_all<const N: usize>(&self, p: &mut Particles<D, N>, fields: Fields) {
+        let words = self.words;
         let copies = p.owned..p.halo;
         let mut before = 0;
         fields.visit(p, |field| {
@@ -163,16 +190,23 @@ impl<const D: usize> Halo<D> {
         p: &Particles<D, N>,
         field: &mut Vec<T>,
     ) {
-        self.outgoing.resize(self.send.iter().map(Vec::len).sum::<usize>() * T::COUNT, 0);
-        self.incoming.resize(self.receive.iter().sum::<usize>() * T::COUNT, 0);
+        self.make_room(T::COUNT);
         self.pack(T::COUNT, 0, field, |value, _| value);
-        self.send(comm, T::COUNT);
+        self.send(comm, || {});
         field.resize(p.halo, T::zero());
         self.unpack(T::COUNT, 0, &mut field[p.owned..]);
     }
 
-    /// Sends what was packed and receives as much, `words` a particle.
-    fn send(&mut self, comm: &Communicator, words: usize) {
+    /// Room for messages of `words` a particle.
+    fn make_room(&mut self, words: usize) {
+        self.words = words;
+        self.outgoing.resize(self.send.iter().map(Vec::len).sum::<usize>() * words, 0);
+        self.incoming.resize(self.receive.iter().sum::<usize>() * words, 0);
+    }
+
+    /// Sends what was packed and receives as much, and does something else `meanwhile`. Collective among the peers.
+    pub fn send(&mut self, comm: &Communicator, meanwhile: impl FnOnce()) {
+        let words = self.words;
         let mut outgoing: Vec<&[u64]> = Vec::with_capacity(self.peers.len());
         let mut rest: &[u64] = &self.outgoing;
         for list in &self.send {
@@ -187,7 +221,7 @@ impl<const D: usize> Halo<D> {
             incoming.push(part);
             rest = tail;
         }
-        payloads(comm, &self.peers, &outgoing, incoming);
+        payloads(comm, &self.peers, &outgoing, incoming, meanwhile);
     }
 
     /// Writes a field into all messages, behind `before` of the `words` that a particle has there.

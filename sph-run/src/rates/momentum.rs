@@ -8,6 +8,7 @@ use crate::physics::Kernel;
 use crate::space::Space;
 use crate::sweep::{Block, Mover, Needs, Pair, Pairs, Sums};
 use std::marker::PhantomData;
+use std::ops::Range;
 
 /// A stress, alone or times the correction of the gradient.
 pub trait Traction<const D: usize, const N: usize, T: Element>: Parts<Number = T> {
@@ -74,8 +75,10 @@ pub struct Stressed<F, T> {
 }
 
 impl<F: Parts> Stressed<F, F::Number> {
-    /// All particles, with `weighted(i)` = w sigma or w sigma L of each. `per_volume`: [`crate::sweep::weight`].
-    pub fn all<const D: usize, const N: usize, S: Space<D, N>, G: Parts<Number = f64>>(
+    /// The particles of a part, behind those before it, with `weighted(i)` = w sigma or w sigma L of each. `per_volume`:
+    /// [`crate::sweep::weight`].
+    pub fn part<const D: usize, const N: usize, S: Space<D, N>, G: Parts<Number = f64>>(
+        part: Range<usize>,
         particles: &Particles<D, N>,
         spacing: f64,
         per_volume: f64,
@@ -85,8 +88,8 @@ impl<F: Parts> Stressed<F, F::Number> {
         F::Number: Element,
     {
         let of = F::Number::of;
-        stressed.clear();
-        stressed.extend((0..particles.len()).map(|i| {
+        stressed.truncate(part.start);
+        stressed.extend(part.map(|i| {
             let weighted = weighted(i);
             Self {
                 weighted: F::from_parts(|k| of(weighted.part(k))),
@@ -102,11 +105,12 @@ pub(super) fn half_radius<const D: usize, const N: usize, S: Space<D, N>>(x: Vec
     0.5 * S::metric(x, spacing).abs()
 }
 
-/// Acceleration of every owned particle, m/s2; gravity is added by the caller. `heat`: power the viscosity turns into
-/// heat, W/kg, half of each pair's.
+/// Acceleration of the owned particles of a part, in whole blocks, m/s2; gravity is added by the caller. `heat`: power the
+/// viscosity turns into heat, W/kg, half of each pair's.
 ///
 /// The viscosity is pi = min(v_ij . x_ij, below)/r^2: of the printed Eq 22 the sign that takes energy out.
 pub fn momentum<const D: usize, const N: usize, S: Space<D, N>, K: Kernel, F: Traction<D, N, T>, T: Element>(
+    part: Range<usize>,
     particles: &Particles<D, N>,
     neighbors: &Neighbors<D>,
     pairs: Pairs,
@@ -119,8 +123,9 @@ pub fn momentum<const D: usize, const N: usize, S: Space<D, N>, K: Kernel, F: Tr
     let viscosity = Viscosity { strength: viscosity.strength / unit, ..viscosity };
     let space = PhantomData::<(S, [(); N])>;
     let sums = &mut Momentum { movers, stressed, viscosity, acceleration, heat, space };
-    neighbors.sweep::<K, T>(pairs, sums);
-    for (i, (acceleration, heat)) in acceleration.iter_mut().zip(heat).enumerate() {
+    neighbors.sweep_part::<K, T>(pairs, part.clone(), sums);
+    let results = acceleration[part.clone()].iter_mut().zip(&mut heat[part.clone()]);
+    for (i, (acceleration, heat)) in part.zip(results) {
         let per_mass = 1.0 / (particles.density[i] * S::metric(particles.x[i], pairs.spacing) * unit);
         *acceleration = *acceleration * per_mass;
         *heat *= -0.5 * per_mass;
