@@ -17,6 +17,7 @@ pub mod geometry;
 pub mod history;
 pub mod layers;
 pub mod netcdf;
+pub mod page;
 pub mod partition;
 pub mod plot;
 pub mod report;
@@ -104,7 +105,10 @@ fn evaluate(arguments: &Arguments) -> Result<Vec<PathBuf>, Failure> {
         paths.push(path);
     }
     paths.extend(summary::write(&analysis, &post)?);
-    paths.extend(plot::pictures(&analysis, &post)?);
+    let pictures = plot::pictures(&analysis, &post)?;
+    let report = page::write(&analysis, &folder, &pictures)?;
+    paths.extend(pictures);
+    paths.push(report);
     if !arguments.quiet {
         say(format_args!("{}", report::table(&analysis)));
     }

@@ -1,4 +1,4 @@
-//! Pictures: SVG and PNG of the same drawing, side by side in `post/`.
+//! Pictures: SVG, PNG and PDF of the same drawing, side by side in `post/`.
 
 mod basal;
 mod basal_normalised;

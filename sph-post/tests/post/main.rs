@@ -1,6 +1,7 @@
 //! `sph-post` on run folders made by hand, with known answers.
 
 mod folder;
+mod report;
 
 use folder::{Made, SCENES, block, hydrostatic, spreading};
 use formats::{exit, folder::RunFolder, results};
@@ -86,7 +87,7 @@ fn everything_is_written_and_told() {
         spreading(&made);
         let called = post(made.run.path(), &["--basal-height", "8 mm"]);
         assert_eq!(called.code, Some(exit::DONE), "{}", called.err);
-        let mut names = vec!["results.nc", "history.nc", "summary.json", "profile_final.csv"];
+        let mut names = vec!["results.nc", "history.nc", "summary.json", "profile_final.csv", "report.html"];
         let pictures = [
             "profiles",
             "surfaces",
@@ -104,7 +105,8 @@ fn everything_is_written_and_told() {
             "top-view",
         ];
         let of_space = &pictures[..pictures.len() - usize::from(scene.name != "3d")];
-        let files: Vec<String> = of_space.iter().flat_map(|p| ["svg", "png"].map(|k| format!("{p}.{k}"))).collect();
+        let files: Vec<String> =
+            of_space.iter().flat_map(|p| ["svg", "png", "pdf"].map(|k| format!("{p}.{k}"))).collect();
         names.extend(files.iter().map(String::as_str));
         for name in &names {
             let path = made.run.post().join(name);
