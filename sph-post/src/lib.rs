@@ -1,8 +1,8 @@
 //! `sph-post`: from the snapshots of a run to numbers (`post/results.nc`, `post/history.nc`) and pictures.
 //!
 //! Serial: one snapshot is in memory at a time, and of several ranks one works. [`geometry`] says what the scene means for the evaluation,
-//! [`sample`] gives fields at any point, [`deposit`], [`basal`], [`dip`], [`energy`], [`layers`], [`section`], [`flow`] and
-//! [`failure_plane`] evaluate one snapshot, [`analysis`] goes through the run, [`partition`] through its history, [`netcdf`], [`plot`] and [`report`] show what it found.
+//! [`sample`] gives fields at any point, [`deposit`], [`basal`], [`dip`], [`energy`], [`layers`], [`section`], [`flow`], [`shear`] and
+//! [`failure_plane`] evaluate one snapshot, [`analysis`] goes through the run, [`partition`] through its history, [`netcdf`], [`plot`], [`page`] and [`report`] show what it found.
 
 pub mod analysis;
 pub mod basal;
@@ -12,6 +12,7 @@ pub mod dip;
 pub mod energy;
 pub mod failure;
 pub mod failure_plane;
+pub mod field;
 pub mod flow;
 pub mod geometry;
 pub mod history;
@@ -20,10 +21,12 @@ pub mod netcdf;
 pub mod page;
 pub mod partition;
 pub mod plot;
+pub mod reference;
 pub mod report;
 pub mod sample;
 pub mod scatter;
 pub mod section;
+pub mod shear;
 pub mod summary;
 #[cfg(test)]
 mod testing;
@@ -93,6 +96,9 @@ fn evaluate(arguments: &Arguments) -> Result<Vec<PathBuf>, Failure> {
         layers: arguments.layers.into(),
         static_speed: arguments.static_speed,
         failure_time: arguments.failure_time,
+        colours: arguments.color.clone(),
+        grain_diameter: arguments.grain_diameter,
+        reference: arguments.reference.as_deref().map(reference::Reference::read).transpose()?,
     };
     let analysis = Analysis::of(&folder, choices)?;
     let post = folder.post();

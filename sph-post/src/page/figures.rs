@@ -6,7 +6,7 @@ use formats::snapshot::FileError;
 use std::path::PathBuf;
 
 /// What pictures show, by the name of their files. Those of one analysis stand together.
-const CAPTIONS: [(&str, &str); 17] = [
+const CAPTIONS: [(&str, &str); 18] = [
     ("profiles", "Surface of the deposit at all snapshots, or at 21 of them."),
     ("surfaces", "The surface at the times that papers show, and in the end."),
     ("front", "Front over time by its three definitions."),
@@ -21,6 +21,7 @@ const CAPTIONS: [(&str, &str); 17] = [
     ("failure-plane", "The failure plane of a column that begins to fall."),
     ("top-view", "Height of the surface from above."),
     ("inertial-number", "Inertial number inside the flow."),
+    ("shear-rate", "Shear rate inside the material."),
     ("stress-sections", "Vertical stress inside the material."),
     ("basal-stress", "Stress near the floor, and the weight of the column above."),
     ("basal-stress-normalised", "The dip of the pressure below the centre."),

@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn numbers_have_up_to_four_digits_and_times_are_readable() {
         let numbers = [0.0, 1.23456, 0.0123456, -2600.0, 0.0072, 1e-9, f64::NAN].map(number);
-        assert_eq!(numbers, ["0", "1.235", "0.012346", "-2600", "0.0072", "1.000e-9", "\u{2013}"]);
+        assert_eq!(numbers, ["0", "1.235", "0.01235", "-2600", "0.0072", "1.000e-9", "\u{2013}"]);
         assert_eq!([0.25, 75.0, 7322.0, -1.0].map(duration), ["0.2 s", "1 min 15 s", "2 h 2 min", "\u{2013}"]);
     }
 }

@@ -9,7 +9,7 @@ use plotters::{
     chart::{ChartBuilder, ChartContext},
     coord::{Shift, cartesian::Cartesian2d, types::RangedCoordf64},
     drawing::{DrawingArea, IntoDrawingArea},
-    element::{PathElement, Rectangle, Text},
+    element::{Circle, PathElement, Rectangle, Text},
     style::{
         Color, FontStyle, IntoFont, RGBColor, ShapeStyle, TextStyle,
         text_anchor::{HPos, Pos, VPos},
@@ -362,6 +362,21 @@ pub fn curve(chart: &mut Axes, points: &[(f64, f64)], style: ShapeStyle) -> Draw
     let finite: Vec<(f64, f64)> = points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite()).collect();
     chart.draw_series([PathElement::new(finite, style)])?;
     Ok(())
+}
+
+/// Measured points: small circles, seen on curves and on white.
+pub fn marks(chart: &mut Axes, points: &[(f64, f64)]) -> Drawn {
+    let radius = 3 * FINE + FINE / 2;
+    let white = RGBColor(255, 255, 255).filled();
+    chart.draw_series(points.iter().map(|p| Circle::new(*p, radius, white)))?;
+    chart.draw_series(points.iter().map(|p| Circle::new(*p, radius, pen(INK, 1.4))))?;
+    Ok(())
+}
+
+/// What such a point means, beside one, at a place in pixels.
+pub fn mark_legend(area: &Area, [x, y]: [f64; 2], text: &str) -> Drawn {
+    area.draw(&Circle::new(place(x + 12.0, y), 3 * FINE + FINE / 2, pen(INK, 1.4)))?;
+    write(area, text, x + 31.0, y, style(SMALL, HPos::Left, VPos::Center))
 }
 
 /// A dashed straight line between two points of the chart that is parallel to an axis.

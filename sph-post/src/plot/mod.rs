@@ -3,15 +3,18 @@
 mod basal;
 mod basal_normalised;
 mod canvas;
+mod coloured;
 mod energies;
 mod failure_plane;
 mod flow;
+mod front;
 mod layers;
 mod panels;
 mod particles;
 mod profiles;
 mod runout;
 mod series;
+mod shear;
 mod stress;
 mod surfaces;
 mod top_view;
@@ -28,14 +31,17 @@ pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Fail
     let all = [
         profiles::draw,
         surfaces::draw,
+        front::draw,
         runout::draw,
         series::draw,
         energies::draw,
         particles::draw,
+        coloured::draw,
         layers::draw,
         flow::draw,
         failure_plane::draw,
         top_view::draw,
+        shear::draw,
         stress::draw,
         basal::draw,
         basal_normalised::draw,
