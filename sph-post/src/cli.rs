@@ -6,7 +6,7 @@ use crate::{
     field::{self, Field},
     flow::StaticSpeed,
 };
-use clap::Parser;
+use clap::{Parser, ValueHint};
 use formats::units::{self, Dimension};
 use std::path::PathBuf;
 
@@ -18,6 +18,7 @@ use std::path::PathBuf;
 #[command(name = "sph-post", version, after_help = EXIT_CODES)]
 pub struct Arguments {
     /// The run folder
+    #[arg(value_hint = ValueHint::DirPath)]
     pub run: PathBuf,
     /// Height above the floor at which basal stresses are taken: smoothing lengths, or a length as "12 mm"
     #[arg(long, value_name = "HEIGHT", default_value = "3 h", value_parser = Level::parse)]
@@ -41,7 +42,7 @@ pub struct Arguments {
     pub grain_diameter: Option<f64>,
     /// Draw these measured curves, too: CSV with the columns curve,x_m,y_m; the curves are `free_surface`, of the final
     /// deposit, and `failure_line`
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub reference: Option<PathBuf>,
     /// Print paths, warnings and errors only
     #[arg(short, long)]

@@ -32,10 +32,14 @@ pub mod summary;
 mod testing;
 
 use analysis::{Analysis, Choices};
-use clap::Parser;
 use cli::Arguments;
 use failure::Failure;
-use formats::{exit, folder::RunFolder, snapshot::FileError};
+use formats::{
+    about::{self, Asked},
+    exit,
+    folder::RunFolder,
+    snapshot::FileError,
+};
 use mpi::{topology::SimpleCommunicator, traits::Communicator as _};
 use std::{ffi::OsString, io::Write as _, path::PathBuf};
 
@@ -61,8 +65,13 @@ fn abort_all_ranks_on_panic() {
 
 /// What rank 0 does.
 fn work(arguments: impl IntoIterator<Item = OsString>) -> i32 {
-    let arguments = match Arguments::try_parse_from(arguments) {
-        Ok(arguments) => arguments,
+    let arguments = match about::parse::<Arguments>(arguments) {
+        Ok(Asked::Work(arguments)) => arguments,
+        Ok(Asked::Text(text)) => {
+            // Whoever closed the pipe has read enough.
+            let _ = std::io::stdout().write_all(&text);
+            return exit::DONE;
+        }
         Err(message) => {
             // Help goes to standard output, errors to standard error; a closed pipe is nobody's concern.
             let _ = message.print();

@@ -1,7 +1,7 @@
 //! How the front goes: where it is, and how fast.
 
 use super::canvas::{self, CURVES, Entry, Frame, MARGIN, SMALL};
-use super::{Times, title};
+use super::{Times, law, title};
 use crate::{analysis::Analysis, failure::Failure};
 use plotters::style::{
     RGBColor,
@@ -18,7 +18,8 @@ const PART: f64 = 1.0 / 40.0;
 /// A curve over time.
 type Points = Vec<(f64, f64)>;
 
-/// Draws `front.svg`, `.png` and `.pdf`; nothing with a single snapshot and no history.
+/// Draws `front.svg`, `.png` and `.pdf`; nothing with a single snapshot and no history, nor where
+/// material that leaves on one side comes in on the other.
 pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let times = Times::of(a);
     let from_snapshots = |pick: &dyn Fn(&crate::deposit::Fronts) -> f64| -> Points {
@@ -36,12 +37,12 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         ("effective: thickness \u{2265} dx/2", CURVES[0], from_snapshots(&|f| f.thickness)),
     ];
     let last = mass.last().map_or(0.0, |p| p.0).max(a.last().time);
-    if last <= 0.0 || mass.len() < 2 {
+    if last <= 0.0 || mass.len() < 2 || a.scene.periodic[0].is_some() {
         return Ok(Vec::new());
     }
     let scaled = a.geometry.runs_outward;
     let value = |front: f64| if scaled { a.scaled(front) } else { front };
-    let law = a.geometry.law().and_then(|l| Some((l.run_out?, format!("final, {}", l.source))));
+    let law = law(a).and_then(|l| Some((l.run_out?, format!("final, {}", l.source))));
     let wave = a.geometry.time_scale().map(|t| a.geometry.height / t);
     let speeds: Points =
         speeds(&mass, PART * last).into_iter().map(|(t, v)| (t / times.unit, v / wave.unwrap_or(1.0))).collect();

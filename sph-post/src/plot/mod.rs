@@ -19,7 +19,7 @@ mod stress;
 mod surfaces;
 mod top_view;
 
-use crate::{analysis::Analysis, failure::Failure};
+use crate::{analysis::Analysis, failure::Failure, geometry::Law};
 use std::path::{Path, PathBuf};
 
 /// Draws everything the run has to show, and returns the paths.
@@ -50,6 +50,11 @@ pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Fail
         paths.extend(draw(analysis, folder)?);
     }
     Ok(paths)
+}
+
+/// The law to draw; none where measured curves of the very case are given.
+fn law(a: &Analysis) -> Option<Law> {
+    a.geometry.law().filter(|_| a.reference.is_none())
 }
 
 /// How lengths are shown: over r0 where there is one, else in m.

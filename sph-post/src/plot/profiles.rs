@@ -1,7 +1,7 @@
 //! Surfaces of the deposit over time.
 
 use super::canvas::{self, Entry, Frame, MARGIN, SMALL, viridis};
-use super::{Lengths, Times, title};
+use super::{Lengths, Times, law, title};
 use crate::{
     analysis::{Analysis, spread},
     deposit::Profile,
@@ -27,7 +27,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let shown = spread(a.moments.len(), CURVES);
     let curves: Vec<(f64, Vec<(f64, f64)>)> =
         shown.iter().map(|&k| (a.moments[k].time, outline(g, &a.moments[k].deposit.profile, lengths.unit))).collect();
-    let law = g.law().filter(|l| l.run_out.is_some() || l.height.is_some());
+    let law = law(a).filter(|l| l.run_out.is_some() || l.height.is_some());
     let (mut x, mut top) = ([0.0_f64, 0.0_f64], 0.0_f64);
     for &(s, h) in curves.iter().flat_map(|c| &c.1) {
         x = [x[0].min(s), x[1].max(s)];

@@ -1,7 +1,7 @@
 //! Run-out and energies over time.
 
 use super::canvas::{self, CURVES, Entry, Frame, MARGIN, SMALL};
-use super::{Times, title};
+use super::{Times, law, title};
 use crate::{analysis::Analysis, failure::Failure};
 use formats::space::Space;
 use plotters::style::{
@@ -21,7 +21,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let times = Times::of(a);
     let (fronts, fronts_name) = fronts(a, times.unit);
     let (energies, energies_name) = energies(a, times.unit);
-    let law = a.geometry.law();
+    let law = law(a);
     let reference = law.and_then(|l| l.run_out);
     let known = law.map_or(String::new(), |l| format!("final, {}", l.source));
     // A history may be ahead of the snapshots, while the run goes on.

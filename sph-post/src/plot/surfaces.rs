@@ -36,7 +36,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let size = [((x[1] - x[0]) * scale).max(LEAST[0]), (top * scale).max(LEAST[1])];
     let inner = [MARGIN[0] + 8.0, 58.0, MARGIN[0] + 8.0 + size[0], 58.0 + size[1]];
     let low = inner[3].max(inner[1] + 20.0 * (curves.len() + 1) as f64);
-    let paper = [(inner[2] + 150.0).max(560.0) as i32, (low + MARGIN[1] + 8.0) as i32];
+    let paper = [(inner[2] + 165.0).max(560.0) as i32, (low + MARGIN[1] + 8.0) as i32];
     canvas::save(folder, "surfaces", paper, |area| {
         canvas::write(area, &title(a, "surface"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
         let explained: Vec<String> =
