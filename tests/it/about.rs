@@ -41,7 +41,7 @@ fn every_case_can_be_explained_in_plain_words() {
     for scene in scenes {
         let said =
             run_within(TIME_LIMIT, Command::new(program("sph-prep")).arg("explain").arg(&scene)).expect(exit::DONE);
-        for words in ["What it is", "released at rest", "particles", "What it leaves out", "particle-steps"] {
+        for words in ["What it is", "What comes out", "particles", "What it leaves out", "particle-steps"] {
             assert!(said.stdout.contains(words), "{}: {words} in {said}", scene.display());
         }
         assert_eq!(said.stderr, "");

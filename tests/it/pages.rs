@@ -193,7 +193,8 @@ fn the_guide_names_options_and_pictures_that_there_are() {
         .flat_map(|cell| cell.split(", ").map(|name| name.trim_matches('`')))
         .collect();
     let sources = repository().join("sph-post/src/plot");
-    let drawn: String = std::fs::read_dir(sources).unwrap().map(|e| std::fs::read_to_string(e.unwrap().path()).unwrap()).collect();
+    let drawn: String =
+        std::fs::read_dir(sources).unwrap().map(|e| std::fs::read_to_string(e.unwrap().path()).unwrap()).collect();
     for name in &shown {
         let quoted = format!("\"{}", name.replace("FIELD", ""));
         assert!(drawn.contains(&quoted), "docs/guide/results.md names a picture that is not drawn: {name}");
