@@ -15,7 +15,8 @@ fn completions_and_manual_pages_are_sound() {
         let script = work.write(&format!("{name}.bash"), &asked(&["--completions", "bash"]));
         // Bash itself completes an option with it.
         let complete = format!(
-            "source '{}'; COMP_WORDS=({name} --comp); COMP_CWORD=1; _{name} {name} --comp {name}; echo \"${{COMPREPLY[@]}}\"",
+            "source '{}'; set -- $(complete -p {name}); while [ \"$1\" != -F ]; do shift; done; COMP_WORDS=({name} --comp); \
+             COMP_CWORD=1; $2 {name} --comp {name}; echo \"${{COMPREPLY[@]}}\"",
             script.display()
         );
         let said = run_within(TIME_LIMIT, Command::new("bash").args(["--norc", "-c", &complete])).expect(exit::DONE);

@@ -46,8 +46,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let wave = a.geometry.time_scale().map(|t| a.geometry.height / t);
     let speeds: Points =
         speeds(&mass, PART * last).into_iter().map(|(t, v)| (t / times.unit, v / wave.unwrap_or(1.0))).collect();
-    let (radial, moved) = (a.geometry.radial, if scaled { " run-out" } else { "" });
-    let name = match (scaled, radial) {
+    let name = match (scaled, a.geometry.radial) {
         (true, true) => "(r \u{2212} r\u{2080}) / r\u{2080}",
         (true, false) => "(x \u{2212} L\u{2080}) / L\u{2080}",
         (false, true) => "r (m)",
@@ -62,8 +61,8 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         [low * 1.06, high * 1.06]
     };
     canvas::save(folder, "front", paper, |area| {
-        let what = format!("front{}", if moved.is_empty() { "" } else { " and run-out" });
-        canvas::write(area, &title(a, &what), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        let what = if scaled { "front and run-out" } else { "front" };
+        canvas::write(area, &title(a, what), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
         canvas::write(area, &times.explained, 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;
         let points = fronts.iter().flat_map(|f| &f.2).map(|p| value(p.1));
         let mut frame = Frame {
