@@ -161,23 +161,28 @@ impl Sampler {
     /// The gradient of a vector field at a point, `[a][b]` = df_a/dx_b, of the same linear fit; zero across the plane of the
     /// plane spaces. Images carry the mirrored vector. `None` where the particles allow no linear fit.
     pub fn gradient(&self, at: [f64; 3], field: &[[f64; 3]]) -> Option<[[f64; 3]; 3]> {
+        /// A particle near the point: its weight, its place from there in h, its value.
+        struct Seen {
+            w: f64,
+            d: [f64; 3],
+            f: [f64; 3],
+        }
         let mut points = Vec::with_capacity(64);
         self.around(at, |p, q| {
-            let offset = [0, 1, 2].map(|a| (p.x[a] - at[a]) / self.h);
-            points.push((p.volume * self.kernel.shape(q), offset, mirrored(field[p.row as usize], p.flipped)));
+            let d = [0, 1, 2].map(|a| (p.x[a] - at[a]) / self.h);
+            points.push(Seen { w: p.volume * self.kernel.shape(q), d, f: mirrored(field[p.row as usize], p.flipped) });
         });
-        let sum: f64 = points.iter().map(|p| p.0).sum();
-        let mean =
-            |pick: &dyn Fn(&(f64, [f64; 3], [f64; 3])) -> f64| points.iter().map(|p| p.0 * pick(p)).sum::<f64>() / sum;
+        let sum: f64 = points.iter().map(|p| p.w).sum();
         if points.len() < 3 || sum <= 0.0 {
             return None;
         }
-        let centre = [0, 1, 2].map(|a| mean(&|p| p.1[a]));
-        let spread = [0, 1, 2].map(|a| [0, 1, 2].map(|b| mean(&|p| (p.1[a] - centre[a]) * (p.1[b] - centre[b]))));
+        let mean = |pick: &dyn Fn(&Seen) -> f64| points.iter().map(|p| p.w * pick(p)).sum::<f64>() / sum;
+        let centre = [0, 1, 2].map(|a| mean(&|p| p.d[a]));
+        let spread = [0, 1, 2].map(|a| [0, 1, 2].map(|b| mean(&|p| (p.d[a] - centre[a]) * (p.d[b] - centre[b]))));
         let axes: &[usize] = if self.dimension == 3 { &[0, 1, 2] } else { &[0, 2] };
         let mut gradient = [[0.0; 3]; 3];
         for (a, row) in gradient.iter_mut().enumerate() {
-            let right = [0, 1, 2].map(|b| mean(&|p| (p.1[b] - centre[b]) * p.2[a]));
+            let right = [0, 1, 2].map(|b| mean(&|p| (p.d[b] - centre[b]) * p.f[a]));
             *row = solve(&spread, right, axes)?.map(|slope| slope / self.h);
         }
         Some(gradient)
