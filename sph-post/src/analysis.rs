@@ -6,14 +6,17 @@ use crate::{
     energy::Energy,
     failure::Failure,
     failure_plane::{FailurePlane, FailureTime},
+    field::Field,
     flow::{Flow, StaticSpeed},
     geometry::Geometry,
     history::History,
     layers::Layers,
     partition::Partition,
+    reference::Reference,
     sample::Sampler,
     scatter::Scatter,
     section::{self, Section},
+    shear::{Grains, Shear},
 };
 use formats::{
     folder::RunFolder,
@@ -30,7 +33,7 @@ const PANELS: usize = 6;
 const SHOWN: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 
 /// What to evaluate.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Choices {
     /// Height at which basal stresses are taken.
     pub basal_height: Level,
@@ -40,6 +43,12 @@ pub struct Choices {
     pub static_speed: StaticSpeed,
     /// When the failure plane is taken.
     pub failure_time: FailureTime,
+    /// What particles are coloured by, besides their speed.
+    pub colours: Vec<&'static Field>,
+    /// Diameter of the grains for the inertial number, m, where the law's is not meant or there is none.
+    pub grain_diameter: Option<f64>,
+    /// Curves that were measured.
+    pub reference: Option<Reference>,
 }
 
 /// What one snapshot shows.
@@ -67,6 +76,8 @@ pub struct Moment {
     pub scatter: Option<Scatter>,
     /// Speed and stress inside, at the times of [`Analysis::sections`].
     pub section: Option<Section>,
+    /// How fast it shears there.
+    pub shear: Option<Shear>,
 }
 
 /// A run, evaluated.
@@ -90,6 +101,12 @@ pub struct Analysis {
     pub sections: Vec<usize>,
     /// The snapshot nearest to the time at which the failure plane is taken; none where that is unknown.
     pub failure: Option<usize>,
+    /// The fields of [`Scatter::fields`].
+    pub colours: Vec<&'static Field>,
+    /// The grains, where they are known.
+    pub grains: Option<Grains>,
+    /// Curves that were measured.
+    pub reference: Option<Reference>,
     /// Layers of the particles, if the start is known.
     pub layers: Option<Layers>,
     /// Speed below which material counts as static, m/s; NaN where it is unknown.
@@ -130,11 +147,13 @@ impl Analysis {
         let sections = geometry.time_scale().map_or_else(|| shown.clone(), |scale| at_times(&times, &SHOWN, scale));
         let failure = Some(choices.failure_time.value(&geometry)).filter(|t| t.is_finite()).map(|t| nearest(&times, t));
         let layers = start(folder, &files)?.map(|start| Layers::new(&geometry, &start, choices.layers));
+        let grains = Grains::of(&geometry, choices.grain_diameter);
+        let colours = &choices.colours[..];
         let mut moments = Vec::with_capacity(files.len());
         for (number, (_, file)) in files.iter().enumerate() {
             let inside = sections.contains(&number);
             let drawn = inside || shown.contains(&number) || failure == Some(number);
-            let wanted = Wanted { level, static_speed, layers: layers.as_ref(), inside, drawn };
+            let wanted = Wanted { level, static_speed, layers: layers.as_ref(), inside, drawn, grains, colours };
             moments.push(moment(&geometry, file, &wanted)?);
         }
         let history = History::read(folder, &index)?;
@@ -149,6 +168,9 @@ impl Analysis {
             spread: shown,
             sections,
             failure,
+            colours: choices.colours,
+            grains,
+            reference: choices.reference,
             layers,
             static_speed,
             history,
@@ -189,6 +211,8 @@ struct Wanted<'a> {
     inside: bool,
     /// Keep the particles for pictures?
     drawn: bool,
+    grains: Option<Grains>,
+    colours: &'a [&'static Field],
 }
 
 fn moment(geometry: &Geometry, file: &Path, wanted: &Wanted) -> Result<Moment, Failure> {
@@ -207,7 +231,8 @@ fn moment(geometry: &Geometry, file: &Path, wanted: &Wanted) -> Result<Moment, F
         layer_tops: layers.map(|layers| layers.tops(geometry, &rows, &deposit.profile)),
         flow: Flow::new(geometry, &rows, &section, wanted.static_speed),
         failure_plane: FailurePlane::new(geometry, &rows, &deposit, &section, plane),
-        scatter: wanted.drawn.then(|| Scatter::new(geometry, &rows, layers, deposit.fronts.thickness)),
+        scatter: wanted.drawn.then(|| Scatter::new(geometry, &rows, layers, deposit.fronts.thickness, wanted.colours)),
+        shear: wanted.inside.then(|| Shear::new(geometry, &rows, &sampler, &section, wanted.grains)),
         section: wanted.inside.then_some(section),
         deposit,
         basal,

@@ -1,7 +1,13 @@
 //! The command line.
 
-use crate::{basal::Level, failure_plane::FailureTime, flow::StaticSpeed};
-use clap::Parser;
+use crate::{
+    basal::Level,
+    failure_plane::FailureTime,
+    field::{self, Field},
+    flow::StaticSpeed,
+};
+use clap::{Parser, ValueHint};
+use formats::units::{self, Dimension};
 use std::path::PathBuf;
 
 /// Evaluate a run: deposit, run-out, layers, failure plane, stresses, energies, and pictures of them.
@@ -12,6 +18,7 @@ use std::path::PathBuf;
 #[command(name = "sph-post", version, after_help = EXIT_CODES)]
 pub struct Arguments {
     /// The run folder
+    #[arg(value_hint = ValueHint::DirPath)]
     pub run: PathBuf,
     /// Height above the floor at which basal stresses are taken: smoothing lengths, or a length as "12 mm"
     #[arg(long, value_name = "HEIGHT", default_value = "3 h", value_parser = Level::parse)]
@@ -27,9 +34,27 @@ pub struct Arguments {
     /// The default is the 40 ms of Szewc (2017) in units of the T of the column there, 74 ms.
     #[arg(long, value_name = "TIME", default_value = "0.54 T", value_parser = FailureTime::parse)]
     pub failure_time: FailureTime,
+    /// Draw the particles coloured by this field, too, as particles-FIELD; may be given several times
+    #[arg(long, value_name = "FIELD", value_parser = field::parse)]
+    pub color: Vec<&'static Field>,
+    /// Diameter of the grains for the inertial number, as "2 mm"; without it that of the law, where it has one
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    pub grain_diameter: Option<f64>,
+    /// Draw these measured curves, too: CSV with the columns curve,x_m,y_m; the curves are `free_surface`, of the final
+    /// deposit, and `failure_line`
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub reference: Option<PathBuf>,
     /// Print paths, warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// A length above 0, m.
+fn length(text: &str) -> Result<f64, String> {
+    match units::parse(text, Dimension::Length)? {
+        value if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err(format!("`{text}` is no diameter: give a length above 0 as \"2 mm\"")),
+    }
 }
 
 const EXIT_CODES: &str = "\
@@ -53,9 +78,19 @@ mod tests {
         assert_eq!(arguments.layers, 5);
         assert_eq!(arguments.static_speed, StaticSpeed::Part(0.01));
         assert_eq!(arguments.failure_time, FailureTime::Scaled(0.54));
-        for (option, wrong) in
-            [("basal-height", "3 kg"), ("layers", "0"), ("layers", "21"), ("static-speed", "1"), ("failure-time", "40")]
-        {
+        let more = ["--color", "pressure", "--color=density", "--grain-diameter", "2 mm"];
+        let arguments = Arguments::try_parse_from(["sph-post", "run/"].into_iter().chain(more)).unwrap();
+        assert_eq!(arguments.color.iter().map(|f| f.name).collect::<Vec<_>>(), ["pressure", "density"]);
+        assert_eq!(arguments.grain_diameter, Some(0.002));
+        for (option, wrong) in [
+            ("basal-height", "3 kg"),
+            ("layers", "0"),
+            ("layers", "21"),
+            ("static-speed", "1"),
+            ("failure-time", "40"),
+            ("color", "hue"),
+            ("grain-diameter", "0 mm"),
+        ] {
             let option = format!("--{option}");
             assert!(Arguments::try_parse_from(["sph-post", "run/", &option, wrong]).is_err(), "{option} {wrong}");
         }

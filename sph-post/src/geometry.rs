@@ -2,6 +2,7 @@
 
 use formats::{
     kernel::Kernel,
+    laws,
     scene::{Body, Material, Scene, Shape},
     space::Space,
 };
@@ -43,6 +44,20 @@ pub struct Geometry {
     pub height: f64,
     /// Aspect ratio of a cylinder on the axis that starts at rest as the only body: for comparison with Lube et al.
     pub cylinder_aspect: Option<f64>,
+    /// Height over length of a rectangle that starts at rest as the only body and can spread to one side only, in plane
+    /// strain: for comparison with Lube et al. (2005).
+    pub plane_aspect: Option<f64>,
+}
+
+/// What a published law says of the final deposit of a column, over its initial extent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Law {
+    /// (front - r0)/r0.
+    pub run_out: Option<f64>,
+    /// Height in the centre.
+    pub height: Option<f64>,
+    /// Whose law it is.
+    pub source: &'static str,
 }
 
 impl Geometry {
@@ -55,6 +70,10 @@ impl Geometry {
         let single = if let [body] = &scene.bodies[..] { Some(body) } else { None };
         let extent = single.map(|b| extent(b, scene.space, radial || mirrored[0]));
         let top = scene.bodies.iter().map(|b| b.shape.bounds(scene.space).1[2]).fold(f64::NEG_INFINITY, f64::max);
+        let runs_outward = single.zip(extent).is_some_and(|(body, [begin, _])| {
+            let left = if radial || mirrored[0] { 0.0 } else { walls[0] };
+            (begin - left).abs() <= 0.5 * dx && runs_right(body, radial)
+        });
         Self {
             space: scene.space,
             kernel: scene.kernel,
@@ -69,10 +88,7 @@ impl Geometry {
             material: scene.material.clone(),
             density: scene.material.density(),
             extent,
-            runs_outward: single.zip(extent).is_some_and(|(body, [begin, _])| {
-                let left = if radial || mirrored[0] { 0.0 } else { walls[0] };
-                (begin - left).abs() <= 0.5 * dx && runs_right(body, radial)
-            }),
+            runs_outward,
             height: (top - floor).max(0.0),
             cylinder_aspect: single.and_then(|b| match b.shape {
                 Shape::Cylinder { radius, height, .. } if b.is_cylinder_on_axis() && b.velocity == [0.0; 3] => {
@@ -80,7 +96,30 @@ impl Geometry {
                 }
                 _ => None,
             }),
+            plane_aspect: single.zip(extent).and_then(|(body, [begin, end])| {
+                let falls = scene.gravity[0] == 0.0 && scene.gravity[2] < 0.0 && walls[1].is_infinite();
+                let (low, high) = body.shape.bounds(scene.space);
+                let stands = body.velocity == [0.0; 3] && (low[2] - floor).abs() <= 0.5 * dx;
+                let is_box = scene.space == Space::PlaneStrain && matches!(body.shape, Shape::Box { .. });
+                (is_box && runs_outward && falls && stands).then(|| (high[2] - low[2]) / (end - begin))
+            }),
         }
+    }
+
+    /// The law for columns like this, if there is one.
+    pub fn law(&self) -> Option<Law> {
+        let round = self.cylinder_aspect.map(|a| Law {
+            run_out: Some(laws::lube_runout(a)),
+            height: laws::lube_height(a),
+            source: "Lube et al. (2004)",
+        });
+        round.or_else(|| {
+            self.plane_aspect.map(|a| Law {
+                run_out: laws::lube_plane_runout(a),
+                height: laws::lube_plane_height(a),
+                source: "Lube et al. (2005)",
+            })
+        })
     }
 
     /// Where a point lies along the profile, m.

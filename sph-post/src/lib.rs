@@ -1,8 +1,8 @@
 //! `sph-post`: from the snapshots of a run to numbers (`post/results.nc`, `post/history.nc`) and pictures.
 //!
 //! Serial: one snapshot is in memory at a time, and of several ranks one works. [`geometry`] says what the scene means for the evaluation,
-//! [`sample`] gives fields at any point, [`deposit`], [`basal`], [`dip`], [`energy`], [`layers`], [`section`], [`flow`] and
-//! [`failure_plane`] evaluate one snapshot, [`analysis`] goes through the run, [`partition`] through its history, [`netcdf`], [`plot`] and [`report`] show what it found.
+//! [`sample`] gives fields at any point, [`deposit`], [`basal`], [`dip`], [`energy`], [`layers`], [`section`], [`flow`], [`shear`] and
+//! [`failure_plane`] evaluate one snapshot, [`analysis`] goes through the run, [`partition`] through its history, [`netcdf`], [`plot`], [`page`] and [`report`] show what it found.
 
 pub mod analysis;
 pub mod basal;
@@ -12,26 +12,34 @@ pub mod dip;
 pub mod energy;
 pub mod failure;
 pub mod failure_plane;
+pub mod field;
 pub mod flow;
 pub mod geometry;
 pub mod history;
 pub mod layers;
 pub mod netcdf;
+pub mod page;
 pub mod partition;
 pub mod plot;
+pub mod reference;
 pub mod report;
 pub mod sample;
 pub mod scatter;
 pub mod section;
+pub mod shear;
 pub mod summary;
 #[cfg(test)]
 mod testing;
 
 use analysis::{Analysis, Choices};
-use clap::Parser;
 use cli::Arguments;
 use failure::Failure;
-use formats::{exit, folder::RunFolder, snapshot::FileError};
+use formats::{
+    about::{self, Asked},
+    exit,
+    folder::RunFolder,
+    snapshot::FileError,
+};
 use mpi::{topology::SimpleCommunicator, traits::Communicator as _};
 use std::{ffi::OsString, io::Write as _, path::PathBuf};
 
@@ -57,8 +65,13 @@ fn abort_all_ranks_on_panic() {
 
 /// What rank 0 does.
 fn work(arguments: impl IntoIterator<Item = OsString>) -> i32 {
-    let arguments = match Arguments::try_parse_from(arguments) {
-        Ok(arguments) => arguments,
+    let arguments = match about::parse::<Arguments>(arguments) {
+        Ok(Asked::Work(arguments)) => arguments,
+        Ok(Asked::Text(text)) => {
+            // Whoever closed the pipe has read enough.
+            let _ = std::io::stdout().write_all(&text);
+            return exit::DONE;
+        }
         Err(message) => {
             // Help goes to standard output, errors to standard error; a closed pipe is nobody's concern.
             let _ = message.print();
@@ -92,6 +105,9 @@ fn evaluate(arguments: &Arguments) -> Result<Vec<PathBuf>, Failure> {
         layers: arguments.layers.into(),
         static_speed: arguments.static_speed,
         failure_time: arguments.failure_time,
+        colours: arguments.color.clone(),
+        grain_diameter: arguments.grain_diameter,
+        reference: arguments.reference.as_deref().map(reference::Reference::read).transpose()?,
     };
     let analysis = Analysis::of(&folder, choices)?;
     let post = folder.post();
@@ -104,7 +120,10 @@ fn evaluate(arguments: &Arguments) -> Result<Vec<PathBuf>, Failure> {
         paths.push(path);
     }
     paths.extend(summary::write(&analysis, &post)?);
-    paths.extend(plot::pictures(&analysis, &post)?);
+    let pictures = plot::pictures(&analysis, &post)?;
+    let report = page::write(&analysis, &folder, &pictures)?;
+    paths.extend(pictures);
+    paths.push(report);
     if !arguments.quiet {
         say(format_args!("{}", report::table(&analysis)));
     }

@@ -157,6 +157,41 @@ impl Sampler {
         }
         Some(Stencil { rows })
     }
+
+    /// The gradient of a vector field at a point, `[a][b]` = df_a/dx_b, of the same linear fit; zero across the plane of the
+    /// plane spaces. Images carry the mirrored vector. `None` where the particles allow no linear fit.
+    pub fn gradient(&self, at: [f64; 3], field: &[[f64; 3]]) -> Option<[[f64; 3]; 3]> {
+        /// A particle near the point: its weight, its place from there in h, its value.
+        struct Seen {
+            w: f64,
+            d: [f64; 3],
+            f: [f64; 3],
+        }
+        let mut points = Vec::with_capacity(64);
+        self.around(at, |p, q| {
+            let d = [0, 1, 2].map(|a| (p.x[a] - at[a]) / self.h);
+            points.push(Seen { w: p.volume * self.kernel.shape(q), d, f: mirrored(field[p.row as usize], p.flipped) });
+        });
+        let sum: f64 = points.iter().map(|p| p.w).sum();
+        if points.len() < 3 || sum <= 0.0 {
+            return None;
+        }
+        let mean = |pick: &dyn Fn(&Seen) -> f64| points.iter().map(|p| p.w * pick(p)).sum::<f64>() / sum;
+        let centre = [0, 1, 2].map(|a| mean(&|p| p.d[a]));
+        let spread = [0, 1, 2].map(|a| [0, 1, 2].map(|b| mean(&|p| (p.d[a] - centre[a]) * (p.d[b] - centre[b]))));
+        let axes: &[usize] = if self.dimension == 3 { &[0, 1, 2] } else { &[0, 2] };
+        let mut gradient = [[0.0; 3]; 3];
+        for (a, row) in gradient.iter_mut().enumerate() {
+            let right = [0, 1, 2].map(|b| mean(&|p| (p.d[b] - centre[b]) * p.f[a]));
+            *row = solve(&spread, right, axes)?.map(|slope| slope / self.h);
+        }
+        Some(gradient)
+    }
+}
+
+/// A vector as its image has it.
+fn mirrored(v: [f64; 3], flipped: [bool; 2]) -> [f64; 3] {
+    [if flipped[0] { -v[0] } else { v[0] }, if flipped[1] { -v[1] } else { v[1] }, v[2]]
 }
 
 /// Filled fractions on the floor under 0, 1, 2 .. lattice layers, up to the kernel's reach.
@@ -225,6 +260,16 @@ impl Stencil {
     /// The value of a scalar field, which images share.
     pub fn even(&self, field: &[f64]) -> f64 {
         self.rows.iter().map(|&(row, _, w)| w * field[row as usize]).sum()
+    }
+
+    /// The value of a vector field; images carry the mirrored vector.
+    pub fn vector(&self, field: &[[f64; 3]]) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for &(row, flipped, w) in &self.rows {
+            let f = mirrored(field[row as usize], flipped);
+            (0..3).for_each(|a| sum[a] += w * f[a]);
+        }
+        sum
     }
 
     /// The value of a symmetric tensor field, XX YY ZZ XY YZ XZ; images carry the mirrored tensor.

@@ -1,6 +1,6 @@
 //! Particles of one snapshot, thinned for a picture.
 
-use crate::{geometry::Geometry, layers::Layers, section::plane};
+use crate::{field::Field, geometry::Geometry, layers::Layers, section::plane};
 use formats::{snapshot::Rows, space::Space};
 use std::collections::BTreeMap;
 
@@ -27,34 +27,44 @@ pub struct Scatter {
     pub size: f64,
     /// What to draw.
     pub squares: Vec<Square>,
+    /// Means of the wanted fields over the particles of each square, field by field.
+    pub fields: Vec<Vec<f64>>,
 }
 
 impl Scatter {
     /// All particles in the plane spaces; in 3-D those less than a spacing from the [`plane`] of the section. Too many are joined
     /// in square cells. Particles beyond `front`, along the profile, are strays.
-    pub fn new(g: &Geometry, rows: &Rows, layers: Option<&Layers>, front: f64) -> Self {
+    pub fn new(g: &Geometry, rows: &Rows, layers: Option<&Layers>, front: f64, fields: &[&Field]) -> Self {
         let section = plane(g, rows);
-        let chosen: Vec<Square> = (0..rows.len())
-            .filter(|&row| g.space != Space::ThreeD || (rows.position[row][1] - section).abs() < g.dx)
-            .map(|row| Square {
-                at: [rows.position[row][0], rows.position[row][2]],
-                speed: rows.velocity[row].iter().map(|v| v * v).sum::<f64>().sqrt(),
-                layers: layers.map(|l| [l.horizontal[row], l.vertical[row]]),
-                stray: g.along(rows.position[row]) > front,
-            })
-            .collect();
+        let near = |row: &usize| g.space != Space::ThreeD || (rows.position[*row][1] - section).abs() < g.dx;
+        let chosen: Vec<usize> = (0..rows.len()).filter(near).collect();
+        let square = |row: usize| Square {
+            at: [rows.position[row][0], rows.position[row][2]],
+            speed: rows.velocity[row].iter().map(|v| v * v).sum::<f64>().sqrt(),
+            layers: layers.map(|l| [l.horizontal[row], l.vertical[row]]),
+            stray: g.along(rows.position[row]) > front,
+        };
         let mut size = g.dx;
-        let mut squares = chosen.clone();
+        let mut squares: Vec<(Square, Vec<usize>)> = chosen.iter().map(|&row| (square(row), vec![row])).collect();
         while squares.len() > MOST {
             size *= 1.25;
-            let mut cells: BTreeMap<[i64; 2], Vec<Square>> = BTreeMap::new();
-            for square in &chosen {
-                cells.entry(square.at.map(|x| (x / size).floor() as i64)).or_default().push(*square);
+            let mut cells: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
+            for &row in &chosen {
+                let x = rows.position[row];
+                cells.entry([x[0], x[2]].map(|x| (x / size).floor() as i64)).or_default().push(row);
             }
             let centre = |k: i64| (k as f64 + 0.5) * size;
-            squares = cells.into_iter().map(|(k, all)| joined(k.map(centre), &all)).collect();
+            let several = |(k, all): ([i64; 2], Vec<usize>)| {
+                let parts: Vec<Square> = all.iter().map(|&row| square(row)).collect();
+                (joined(k.map(centre), &parts), all)
+            };
+            squares = cells.into_iter().map(several).collect();
         }
-        Self { size, squares }
+        let mean = |field: &Field, all: &[usize]| {
+            all.iter().map(|&row| (field.value)(rows, row)).sum::<f64>() / all.len() as f64
+        };
+        let fields = fields.iter().map(|field| squares.iter().map(|(_, all)| mean(field, all)).collect()).collect();
+        Self { size, squares: squares.into_iter().map(|s| s.0).collect(), fields }
     }
 }
 
@@ -76,7 +86,10 @@ fn joined(at: [f64; 2], all: &[Square]) -> Square {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{block, geometry};
+    use crate::{
+        field,
+        testing::{block, geometry},
+    };
     use formats::kernel::Kernel;
 
     #[test]
@@ -84,14 +97,15 @@ mod tests {
         let g = geometry(Space::PlaneStrain, Kernel::CubicSpline, 0.01);
         let mut rows = block(&g, [20, 1, 20]);
         rows.velocity.fill([3.0, 0.0, 4.0]);
-        let s = Scatter::new(&g, &rows, None, f64::INFINITY);
+        let s = Scatter::new(&g, &rows, None, f64::INFINITY, &[]);
         assert_eq!((s.squares.len(), s.size), (400, 0.01));
         let mut rows = block(&g, [100, 1, 100]);
         rows.velocity.fill([3.0, 0.0, 4.0]);
         let layers = Layers::new(&g, &rows.position, 5);
-        let s = Scatter::new(&g, &rows, Some(&layers), 0.9);
+        let s = Scatter::new(&g, &rows, Some(&layers), 0.9, &[field::parse("velocity_z").unwrap()]);
         assert!(s.squares.len() <= MOST && s.squares.len() > MOST / 3, "{}", s.squares.len());
         assert!(s.squares.iter().all(|q| (q.speed - 5.0).abs() < 1e-12));
+        assert!(s.fields[0].len() == s.squares.len() && s.fields[0].iter().all(|v| (v - 4.0).abs() < 1e-12));
         // Layers are 0.2 m thick; a square that lies across two has one of them.
         let near = |n: u8, v: f64| (f64::from(n) * 0.2 - s.size..=(f64::from(n) + 1.0) * 0.2 + s.size).contains(&v);
         assert!(s.squares.iter().all(|q| q.layers.is_some_and(|l| near(l[0], q.at[1]) && near(l[1], q.at[0]))));
@@ -102,6 +116,6 @@ mod tests {
     fn a_section_is_taken_in_space() {
         let g = geometry(Space::ThreeD, Kernel::CubicSpline, 0.01);
         let rows = block(&g, [5, 5, 5]);
-        assert_eq!(Scatter::new(&g, &rows, None, f64::INFINITY).squares.len(), 25);
+        assert_eq!(Scatter::new(&g, &rows, None, f64::INFINITY, &[]).squares.len(), 25);
     }
 }

@@ -95,7 +95,7 @@ pub fn plane(g: &Geometry, rows: &Rows) -> f64 {
 }
 
 /// Where the section at distance `s` is looked at: evenly spread over the modelled angle, or one place.
-fn places(g: &Geometry, s: f64, y: f64) -> Vec<[f64; 2]> {
+pub(crate) fn places(g: &Geometry, s: f64, y: f64) -> Vec<[f64; 2]> {
     if !(g.radial && g.space == Space::ThreeD) {
         return vec![[s, y]];
     }

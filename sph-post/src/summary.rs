@@ -111,8 +111,8 @@ fn at(points: &[[f64; 2]], time: f64) -> f64 {
     }
 }
 
-/// NaN where nothing ever moved.
-fn kinetic_over_peak(a: &Analysis) -> f64 {
+/// Kinetic energy at the end over its peak; NaN where nothing ever moved.
+pub fn kinetic_over_peak(a: &Analysis) -> f64 {
     let energies = series(a, "kinetic_energy", |m| m.energy.kinetic);
     let peak = energies.iter().fold(0.0_f64, |peak, e| peak.max(e[1]));
     energies.last().map_or(f64::NAN, |e| e[1] / peak)

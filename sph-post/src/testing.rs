@@ -39,6 +39,7 @@ pub fn geometry(space: Space, kernel: Kernel, dx: f64) -> Geometry {
         runs_outward: false,
         height: 0.1,
         cylinder_aspect: None,
+        plane_aspect: None,
     }
 }
 

@@ -1,18 +1,20 @@
 //! The command line.
 
-use clap::Parser;
+use clap::{Parser, ValueHint};
 use std::path::PathBuf;
 
 /// Make a run folder from a scene: particles, the scene as it was, and where they come from.
 ///
-/// Works alone or under mpirun; the particles are the same on any number of ranks.
+/// Works alone or under mpirun; the particles are the same on any number of ranks. `sph-prep explain scene.toml` says in
+/// plain words what a scene is, what computing it takes and what it leaves out, and makes nothing.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "sph-prep", version, after_help = EXIT_CODES)]
 pub struct Arguments {
     /// The scene file
+    #[arg(value_hint = ValueHint::FilePath)]
     pub scene: PathBuf,
     /// The run folder to make; it must not exist yet, or be empty
-    #[arg(short, long, value_name = "RUN")]
+    #[arg(short, long, value_name = "RUN", value_hint = ValueHint::DirPath)]
     pub output: PathBuf,
     /// Print warnings and errors only
     #[arg(short, long)]

@@ -5,6 +5,7 @@
 
 pub mod advice;
 pub mod cli;
+pub mod explain;
 pub mod failure;
 pub mod fill;
 pub mod initial;
@@ -20,11 +21,12 @@ mod testing;
 pub mod text;
 pub mod wall;
 
-use clap::Parser;
+use clap::Parser as _;
 use cli::Arguments;
 use failure::{Failure, agree};
 use fill::Plan;
 use formats::{
+    about::{self, Asked},
     exit,
     provenance::{self, Entry},
     scene::{Fault, Scene, SceneError},
@@ -53,8 +55,19 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> i32 {
     }));
     let world = universe.world();
     let talks = world.rank() == 0;
-    let arguments = match Arguments::try_parse_from(arguments) {
-        Ok(arguments) => arguments,
+    let words: Vec<OsString> = arguments.into_iter().collect();
+    if words.get(1).is_some_and(|word| word == "explain") {
+        return if talks { explain(words.into_iter().skip(1)) } else { exit::DONE };
+    }
+    let arguments = match about::parse::<Arguments>(words) {
+        Ok(Asked::Work(arguments)) => arguments,
+        Ok(Asked::Text(text)) => {
+            if talks {
+                // Whoever closed the pipe has read enough.
+                let _ = std::io::stdout().write_all(&text);
+            }
+            return exit::DONE;
+        }
         Err(message) => {
             if talks {
                 // Help goes to standard output, errors to standard error; a closed pipe is nobody's concern.
@@ -76,6 +89,33 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> i32 {
             if talks {
                 text::print(&failure, &text);
             }
+            failure.exit_code()
+        }
+    }
+}
+
+/// Explains a scene on standard output; rank 0 alone. Returns the exit code.
+fn explain(words: impl IntoIterator<Item = OsString>) -> i32 {
+    let arguments = match explain::Arguments::try_parse_from(words) {
+        Ok(arguments) => arguments,
+        Err(message) => {
+            let _ = message.print();
+            return if message.use_stderr() { exit::USAGE } else { exit::DONE };
+        }
+    };
+    let mut text = String::new();
+    let scene = text::read(&arguments.scene).and_then(|found| {
+        text = found;
+        Ok(Scene::read(&arguments.scene.display().to_string(), &text)?)
+    });
+    match scene {
+        Ok(scene) => {
+            // Whoever closed the pipe has read enough.
+            let _ = write!(std::io::stdout(), "{}", explain::text(&scene));
+            exit::DONE
+        }
+        Err(failure) => {
+            text::print(&failure, &text);
             failure.exit_code()
         }
     }

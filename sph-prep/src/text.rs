@@ -32,7 +32,11 @@ pub fn broadcast(mut bytes: Vec<u8>, comm: &impl Communicator) -> Vec<u8> {
     bytes
 }
 
-fn read(path: &Path) -> Result<String, Failure> {
+/// Reads a file; one rank alone.
+///
+/// # Errors
+/// As [`share`].
+pub fn read(path: &Path) -> Result<String, Failure> {
     let failure = |why: String| Failure::NoScene { path: path.to_owned(), why };
     let bytes = std::fs::read(path).map_err(|e| failure(e.to_string()))?;
     String::from_utf8(bytes).map_err(|e| {

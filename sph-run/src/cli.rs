@@ -1,7 +1,7 @@
 //! The command line.
 
 use crate::lanes::Instructions;
-use clap::{Parser, ValueEnum};
+use clap::{Parser, ValueEnum, ValueHint};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -18,6 +18,7 @@ use std::time::Duration;
 )]
 pub struct Cli {
     /// The run folder made by sph-prep.
+    #[arg(value_hint = ValueHint::DirPath)]
     pub run: PathBuf,
 
     /// Refuse a run that has begun instead of resuming it.
@@ -29,7 +30,7 @@ pub struct Cli {
     pub check: bool,
 
     /// Go on under a changed scene: a later end, other outputs. What else is changed in it is refused.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub scene: Option<PathBuf>,
 
     /// Go back to the checkpoint of this step (see --check) and go on from there. Later ones are set aside, and what was

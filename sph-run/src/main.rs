@@ -1,6 +1,6 @@
 //! `sph-run`: time stepping on MPI.
 
-use clap::Parser;
+use formats::about::{self, Asked};
 use formats::folder::RunFolder;
 use formats::h5::Communicator;
 use formats::scene::Scene;
@@ -16,6 +16,7 @@ use sph_run::parallel::agree::{agree, share_text};
 use sph_run::resume::{Past, Start, read_scene};
 use sph_run::run::{Outcome, Run};
 use sph_run::{check, dispatch, parallel, scheduler};
+use std::io::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc;
@@ -27,7 +28,15 @@ static ALLOCATOR: HugePages = HugePages;
 fn main() {
     let begun = Instant::now();
     let signalled = Limits::watch_signals();
-    let cli = Cli::try_parse();
+    let cli = match about::parse::<Cli>(std::env::args_os()) {
+        Ok(Asked::Work(cli)) => Ok(cli),
+        Ok(Asked::Text(text)) => {
+            // Whoever closed the pipe has read enough.
+            let _ = std::io::stdout().write_all(&text);
+            std::process::exit(exit::DONE);
+        }
+        Err(error) => Err(error),
+    };
     if let Ok(Cli { check: true, run, .. }) = &cli {
         std::process::exit(check::report(&RunFolder::new(run)));
     }

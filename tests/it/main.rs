@@ -1,5 +1,6 @@
 //! Tests of the programs as users run them, in one binary.
 
+mod about;
 mod bad_input;
 mod bench;
 mod pages;

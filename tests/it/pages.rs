@@ -172,3 +172,32 @@ fn stale_figures_are_found() {
     let two = table("a", "12345678") + "| case | here |\n|---|---|\n| b | 1 |\n| gone | 2 |\n";
     assert_eq!(faults(&two), ["b: the hash of its scene is not there", "gone: there is no such case"]);
 }
+
+/// What a page of the guide says of options and pictures is what `sph-post` has.
+#[test]
+fn the_guide_names_options_and_pictures_that_there_are() {
+    let help = tests::run("sph-post", &["--help"], 0).expect(formats::exit::DONE).stdout;
+    let text = page("docs/guide/results.md");
+    let options: BTreeSet<&str> = text
+        .lines()
+        .filter(|line| line.starts_with("    sph-post "))
+        .flat_map(str::split_whitespace)
+        .filter(|word| word.starts_with("--"))
+        .collect();
+    assert!(options.len() > 5, "{options:?}");
+    let unknown: Vec<_> = options.into_iter().filter(|option| !help.contains(&format!("{option} <"))).collect();
+    assert!(unknown.is_empty(), "docs/guide/results.md names options that sph-post has not: {unknown:?}");
+    let shown: BTreeSet<&str> = rows(&text)
+        .iter()
+        .filter_map(|row| row.get("Picture").copied())
+        .flat_map(|cell| cell.split(", ").map(|name| name.trim_matches('`')))
+        .collect();
+    let sources = repository().join("sph-post/src/plot");
+    let drawn: String =
+        std::fs::read_dir(sources).unwrap().map(|e| std::fs::read_to_string(e.unwrap().path()).unwrap()).collect();
+    for name in &shown {
+        let quoted = format!("\"{}", name.replace("FIELD", ""));
+        assert!(drawn.contains(&quoted), "docs/guide/results.md names a picture that is not drawn: {name}");
+    }
+    assert!(shown.len() > 15, "{shown:?}");
+}

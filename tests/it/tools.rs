@@ -1,9 +1,10 @@
-//! Our files in other people's readers: VTK, PyVista, h5dump, ncdump, xarray and the checker of the CF conventions.
+//! Our files in other people's readers: VTK, PyVista, h5dump, ncdump, xarray, the checker of the CF conventions, a browser.
 
 use formats::exit;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use tests::{WorkFolder, python, whole_run};
+use tests::{WorkFolder, prepared, python, run, whole_run};
 
 const COLUMN: &str = r#"
 title = "Column for readers"
@@ -34,8 +35,13 @@ snapshots = "10 ms"
 history = "2 ms"
 "#;
 
+const SPACES: [&str; 3] = ["axisymmetric", "plane-strain", "3d"];
+
 fn scene(space: &str) -> String {
-    COLUMN.replace("SPACE", space)
+    let cylinder = r#"cylinder = { radius = "0.1 m", height = "0.1 m" }"#;
+    let rectangle = r#"box = { min = [0, 0, 0], max = ["0.1 m", 0, "0.1 m"] }"#;
+    let text = COLUMN.replace("SPACE", space);
+    if space == "plane-strain" { text.replace(cylinder, rectangle) } else { text }
 }
 
 /// The last snapshot of a run.
@@ -54,25 +60,82 @@ fn dump(tool: &str, package: &str, header_only: &str, file: &Path) -> String {
 fn snapshots_open_in_vtk_and_pyvista() {
     let Some(interpreter) = python::interpreter() else { return };
     let work = WorkFolder::new();
-    for space in ["axisymmetric", "3d"] {
+    for space in SPACES {
         let folder = whole_run(&work, space, &scene(space), 2);
-        python::script(&interpreter, "snapshot.py", &[&last_snapshot(&folder), &folder.series()]).expect(exit::DONE);
-        python::script(&interpreter, "snapshot.py", &[&folder.initial(), &folder.series()]).expect(exit::DONE);
+        let state = folder.generation(1).join("state.hdf");
+        for path in [&last_snapshot(&folder), &folder.initial(), &state] {
+            python::script(&interpreter, "snapshot.py", &[path, &folder.series()]).expect(exit::DONE);
+        }
     }
+    // What is left of a run that failed at once, since its body falls too fast.
+    let falls = scene("axisymmetric").replace("\n\n[wall.floor]", "\nvelocity = [0, 0, \"-2000 m/s\"]\n\n[wall.floor]");
+    let folder = prepared(&work, "falls", &falls, 1);
+    run("sph-run", &[folder.path()], 1).expect(exit::NUMERICAL);
+    python::repository_script(&interpreter, "tests/vtk/open.py", &[&folder.out().join("fault.hdf")]).expect(exit::DONE);
 }
 
 #[test]
 fn results_open_in_xarray_and_pass_the_cf_checker() {
     let Some(interpreter) = python::interpreter() else { return };
     let work = WorkFolder::new();
-    for space in ["axisymmetric", "3d"] {
-        let folder = whole_run(&work, space, &scene(space), 2);
-        let results = folder.post().join("results.nc");
+    for space in SPACES {
+        let folder = prepared(&work, space, &scene(space), 1);
+        run("sph-run", &[folder.path()], 1).expect(exit::DONE);
+        let asked: [&OsStr; 3] = [folder.path().as_os_str(), "--grain-diameter".as_ref(), "1 mm".as_ref()];
+        run("sph-post", &asked, 0).expect(exit::DONE);
+        let [results, history] = ["results.nc", "history.nc"].map(|name| folder.post().join(name));
         python::script(&interpreter, "results.py", &[&results]).expect(exit::DONE);
         let mut checker = Command::new(interpreter.with_file_name("compliance-checker"));
-        checker.args(["--test=cf:1.11", "--criteria=strict"]).arg(&results);
+        checker.args(["--test=cf:1.11", "--criteria=strict"]).args([&results, &history]);
         tests::run_within(tests::TIME_LIMIT, &mut checker).expect(exit::DONE);
     }
+}
+
+#[test]
+fn an_ensemble_of_restarted_runs_has_the_numbers_of_sph_post() {
+    let Some(interpreter) = python::interpreter() else { return };
+    let work = WorkFolder::new();
+    let longer = scene("axisymmetric").replace("2 cm", "1 cm").replace("0.04 s", "0.2 s");
+    let folders = ["25 deg", "35 deg"].map(|friction| {
+        let name = &friction[..2];
+        let folder = prepared(&work, name, &longer.replace("30 deg", friction), 1);
+        // Stopped once, on the way, and gone on with on two ranks.
+        let stop: [&OsStr; 3] = [folder.path().as_os_str(), "--stop-after-steps".as_ref(), "150".as_ref()];
+        run("sph-run", &stop, 1).expect(exit::RESUMABLE);
+        run("sph-run", &[folder.path()], 2).expect(exit::DONE);
+        run("sph-post", &[folder.path()], 0).expect(exit::DONE);
+        folder
+    });
+    let [weak, strong] = [folders[0].path(), folders[1].path()];
+    let said = python::script(&interpreter, "ensemble.py", &[weak, strong]).expect(exit::DONE).stdout;
+    assert!(said.contains("over 2 members"), "{said}");
+    // The figure of the guide, from the same runs.
+    let figure = work.join("figure.pdf");
+    let words = [weak, strong, Path::new("-o"), &figure];
+    python::repository_script(&interpreter, "docs/guide/figure.py", &words).expect(exit::DONE);
+    assert!(std::fs::read(&figure).unwrap().starts_with(b"%PDF-"));
+}
+
+/// Browsers that work without a display, by the names of their programs.
+const BROWSERS: [&str; 5] =
+    ["chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+
+#[test]
+fn the_report_opens_in_a_browser_without_network() {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let found = std::env::split_paths(&path).flat_map(|folder| BROWSERS.map(|name| folder.join(name)));
+    let Some(browser) = found.into_iter().find(|path| path.is_file()) else {
+        tests::left_out(
+            "no browser on the path (Debian: chromium-headless-shell), so the report was not looked at in one",
+        );
+        return;
+    };
+    let work = WorkFolder::new();
+    let folder = whole_run(&work, "run", &scene("axisymmetric"), 1);
+    let report = folder.post().join("report.html");
+    let words = [browser.as_path(), &report, &work.join("screen.png")];
+    let said = python::repository_script(Path::new("python3"), "tests/it/report.py", &words).expect(exit::DONE).stdout;
+    assert!(said.contains("figures"), "{said}");
 }
 
 #[test]

@@ -70,8 +70,13 @@ fn index_fault(output: &Output) -> Option<String> {
 
 /// Runs a script of `tests/it` with the interpreter.
 pub fn script(python: &Path, name: &str, arguments: &[&Path]) -> Output {
+    repository_script(python, &format!("tests/it/{name}"), arguments)
+}
+
+/// Runs any script of the repository with the interpreter.
+pub fn repository_script(python: &Path, name: &str, arguments: &[&Path]) -> Output {
     let mut command = Command::new(python);
-    command.arg(repository().join("tests/it").join(name)).args(arguments);
+    command.arg(repository().join(name)).args(arguments);
     // Rendering without a display; no byte code in the source folder.
     command.env("PYTHONDONTWRITEBYTECODE", "1").env("PYVISTA_OFF_SCREEN", "true");
     run_within(crate::TIME_LIMIT, &mut command)

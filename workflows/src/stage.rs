@@ -156,11 +156,16 @@ pub fn advance(programs: &Programs, job: &Job, options: &[String]) -> Result<Opt
     launch::wait_with(command, Stop::Gently, job.log).map(Some)
 }
 
-/// The last stage: results from what was computed.
+/// The last stage: results from what was computed, with the curves of a `measured.csv` beside the scene.
 pub fn evaluate(programs: &Programs, job: &Job) -> Result<(), Failure> {
     say(job, "sph-post");
     let post = programs.path("sph-post");
+    let measured = job.scene.with_file_name("measured.csv");
     let command = cmd!(programs.shell, "{post}").arg(job.folder);
+    let command = match measured.is_file() {
+        true => command.arg("--reference").arg(measured),
+        false => command,
+    };
     passed("sph-post", launch::wait_with(command, Stop::AtOnce, job.log)?, job)
 }
 

@@ -7,6 +7,9 @@ use crate::{
 };
 use formats::results::{Dataset, Role, Variable};
 
+/// A field over the cells of a section.
+type Cells<'a> = Vec<(&'a Section, &'a [f64])>;
+
 /// Adds everything to a file that has the coordinate of the profiles, of `count` bins from `first` on.
 pub fn inside(a: &Analysis, d: &mut Dataset, first: i64, count: usize) {
     layers(a, d, first, count);
@@ -94,24 +97,34 @@ fn sections(a: &Analysis, d: &mut Dataset, sections: &[(&Moment, &Section)], [fi
     let times = sections.iter().map(|s| s.0.time).collect();
     let long = "time since the start of the run, of the sections";
     d.variable(Variable::new("t_section", Role::Coordinate, &["t_section"], long, "s", times));
-    for (variable, long, unit, field) in [
-        (
-            "section_stress_zz",
-            "normal stress sigma_zz in a vertical section",
-            "Pa",
-            (|s| &s.stress_zz[..]) as for<'s> fn(&'s Section) -> &'s [f64],
-        ),
-        ("section_speed", "speed in a vertical section", "m s-1", |s| &s.speed[..]),
-    ] {
+    let mut add = |variable: &str, long: &str, unit: &str, cells: Cells| {
         let mut values = Vec::with_capacity(sections.len() * rows * count as usize);
-        for (_, section) in sections {
+        for (section, field) in cells {
             for j in 0..rows {
-                let row =
-                    if j < section.rows { &field(section)[j * section.bins..(j + 1) * section.bins] } else { &[] };
+                let row = if j < section.rows { &field[j * section.bins..(j + 1) * section.bins] } else { &[] };
                 values.extend(over_bins(section.first, row, first, count as usize, f64::NAN));
             }
         }
         let v = Variable::new(variable, Role::Data, &["t_section", "z", name], long, unit, values);
         d.variable(v.with("cell_methods", format!("z: point {name}: {}", method(a))));
+    };
+    let stress = sections.iter().map(|(_, s)| (*s, &s.stress_zz[..])).collect();
+    add("section_stress_zz", "normal stress sigma_zz in a vertical section", "Pa", stress);
+    let speed = sections.iter().map(|(_, s)| (*s, &s.speed[..])).collect();
+    add("section_speed", "speed in a vertical section", "m s-1", speed);
+    let sheared: Vec<_> = sections.iter().filter_map(|(m, s)| Some((*s, m.shear.as_ref()?))).collect();
+    let rate = sheared.iter().map(|(s, shear)| (*s, &shear.rate[..])).collect();
+    let long = "shear rate sqrt(2 D:D) of the deviator D of the rate of deformation, in a vertical section";
+    add("section_shear_rate", long, "s-1", rate);
+    if let Some(grains) = a.grains {
+        let number = sheared.iter().filter_map(|(s, shear)| Some((*s, &shear.inertial.as_ref()?[..]))).collect();
+        let long = "inertial number in a vertical section; missing where nothing is pressed";
+        add("section_inertial_number", long, "1", number);
+        for (name, long, unit, value) in [
+            ("grain_diameter", "diameter of the grains that the inertial number is of", "m", grains.diameter),
+            ("grain_density", "density of the grains that the inertial number is of", "kg m-3", grains.density),
+        ] {
+            d.variable(Variable::new(name, Role::Data, &[], long, unit, vec![value]));
+        }
     }
 }

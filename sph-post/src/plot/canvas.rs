@@ -1,7 +1,7 @@
 //! Paper, pen and font: everything pictures have in common.
 //!
 //! A picture is drawn once, as SVG; the PNG is rendered from it with the font that is built in, so that both look
-//! alike on any machine, with or without fonts.
+//! alike on any machine, with or without fonts. The PDF, for papers, is the same drawing in vectors with that font inside.
 
 use crate::failure::Failure;
 use formats::disk;
@@ -9,7 +9,7 @@ use plotters::{
     chart::{ChartBuilder, ChartContext},
     coord::{Shift, cartesian::Cartesian2d, types::RangedCoordf64},
     drawing::{DrawingArea, IntoDrawingArea},
-    element::{PathElement, Rectangle, Text},
+    element::{Circle, PathElement, Rectangle, Text},
     style::{
         Color, FontStyle, IntoFont, RGBColor, ShapeStyle, TextStyle,
         text_anchor::{HPos, Pos, VPos},
@@ -57,7 +57,7 @@ pub type Axes<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64,
 /// What drawing may fail with.
 pub type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-/// Draws one picture of `size` pixels as `<name>.svg` and `<name>.png`, and returns their paths.
+/// Draws one picture of `size` pixels as `<name>.svg`, `.png` and `.pdf`, and returns their paths.
 ///
 /// # Errors
 /// `CannotWrite`, `DiskFull`; `Picture` where the drawing itself fails.
@@ -67,7 +67,7 @@ pub fn save(
     size: [i32; 2],
     draw: impl FnOnce(&Area) -> Drawn,
 ) -> Result<Vec<PathBuf>, Failure> {
-    let paths = ["svg", "png"].map(|kind| folder.join(format!("{name}.{kind}")));
+    let paths = ["svg", "png", "pdf"].map(|kind| folder.join(format!("{name}.{kind}")));
     let fault = |what: String| Failure::Picture { path: paths[0].display().to_string(), what };
     let known = plotters::style::register_font(FAMILY, FontStyle::Normal, FONT);
     known.map_err(|_| fault("the built-in font is damaged".into()))?;
@@ -81,8 +81,9 @@ pub fn save(
     }
     let text = finish(&text, size);
     disk::write_atomic(&paths[0], text.as_bytes())?;
-    let png = render(&text).map_err(fault)?;
-    disk::write_atomic(&paths[1], &png)?;
+    let tree = tree(&text).map_err(fault)?;
+    disk::write_atomic(&paths[1], &png(&tree).map_err(fault)?)?;
+    disk::write_atomic(&paths[2], &pdf(&tree).map_err(fault)?)?;
     Ok(paths.to_vec())
 }
 
@@ -129,16 +130,26 @@ fn finish(text: &str, size: [i32; 2]) -> String {
     out
 }
 
-/// The picture as PNG.
-fn render(text: &str) -> Result<Vec<u8>, String> {
+/// The picture as a tree of shapes and text in the built-in font.
+fn tree(text: &str) -> Result<usvg::Tree, String> {
     let mut options = usvg::Options { font_family: FAMILY.into(), ..usvg::Options::default() };
     let fonts = Arc::make_mut(&mut options.fontdb);
     fonts.load_font_data(FONT.to_vec());
     fonts.set_sans_serif_family(FAMILY);
-    let tree = usvg::Tree::from_str(text, &options).map_err(|error| error.to_string())?;
+    usvg::Tree::from_str(text, &options).map_err(|error| error.to_string())
+}
+
+/// As PDF, a point for a pixel of the SVG.
+fn pdf(tree: &usvg::Tree) -> Result<Vec<u8>, String> {
+    let converted = svg2pdf::to_pdf(tree, svg2pdf::ConversionOptions::default(), svg2pdf::PageOptions::default());
+    converted.map_err(|error| error.to_string())
+}
+
+/// As PNG.
+fn png(tree: &usvg::Tree) -> Result<Vec<u8>, String> {
     let size = tree.size().to_int_size().scale_by(ZOOM).ok_or("it has no size")?;
     let mut pixels = tiny_skia::Pixmap::new(size.width(), size.height()).ok_or("it is too large")?;
-    resvg::render(&tree, tiny_skia::Transform::from_scale(ZOOM, ZOOM), &mut pixels.as_mut());
+    resvg::render(tree, tiny_skia::Transform::from_scale(ZOOM, ZOOM), &mut pixels.as_mut());
     pixels.encode_png().map_err(|error| error.to_string())
 }
 
@@ -351,6 +362,21 @@ pub fn curve(chart: &mut Axes, points: &[(f64, f64)], style: ShapeStyle) -> Draw
     let finite: Vec<(f64, f64)> = points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite()).collect();
     chart.draw_series([PathElement::new(finite, style)])?;
     Ok(())
+}
+
+/// Measured points: small circles, seen on curves and on white.
+pub fn marks(chart: &mut Axes, points: &[(f64, f64)]) -> Drawn {
+    let radius = 3 * FINE + FINE / 2;
+    let white = RGBColor(255, 255, 255).filled();
+    chart.draw_series(points.iter().map(|p| Circle::new(*p, radius, white)))?;
+    chart.draw_series(points.iter().map(|p| Circle::new(*p, radius, pen(INK, 1.4))))?;
+    Ok(())
+}
+
+/// What such a point means, beside one, at a place in pixels.
+pub fn mark_legend(area: &Area, [x, y]: [f64; 2], text: &str) -> Drawn {
+    area.draw(&Circle::new(place(x + 12.0, y), 3 * FINE + FINE / 2, pen(INK, 1.4)))?;
+    write(area, text, x + 31.0, y, style(SMALL, HPos::Left, VPos::Center))
 }
 
 /// A dashed straight line between two points of the chart that is parallel to an axis.

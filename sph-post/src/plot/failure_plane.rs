@@ -19,6 +19,9 @@ const SURFACE: RGBColor = RGBColor(255, 255, 255);
 /// The straight line, seen on viridis and on white.
 const STRAIGHT: RGBColor = RGBColor(230, 110, 170);
 
+/// A measured line, seen on viridis and on white.
+const MEASURED: RGBColor = RGBColor(86, 180, 233);
+
 /// Draws `failure-plane.svg` and `.png`; nothing where the snapshot nearest to the wanted time shows no plane.
 pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let Some(moment) = a.failure.map(|k| &a.moments[k]) else { return Ok(Vec::new()) };
@@ -35,6 +38,9 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let meets = low[1] + (high[1] - low[1]) * (begin - low[0]) / (high[0] - low[0]);
     let top = if high[0] < low[0] { meets } else { f64::INFINITY };
     let top = top.min(high[1] + low[1]).min(moment.deposit.height_max);
+    let points = a.reference.as_ref().map_or(Vec::new(), |r| r.failure.clone());
+    let is_measured = points.len() > 1;
+    let measured = is_measured.then_some(Line { points, colour: MEASURED, width: 2.2, dashed: false });
     let picture = Picture {
         name: "failure-plane",
         what: "failure plane",
@@ -46,10 +52,18 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         panels: vec![Panel {
             moment,
             patches,
-            lines: vec![
-                Line { points: contour, colour: SURFACE, width: 1.6, dashed: false },
-                Line { points: vec![[reach(0.0), 0.0], [reach(top), top]], colour: STRAIGHT, width: 2.6, dashed: true },
-            ],
+            lines: measured
+                .into_iter()
+                .chain([
+                    Line { points: contour, colour: SURFACE, width: 1.6, dashed: false },
+                    Line {
+                        points: vec![[reach(0.0), 0.0], [reach(top), top]],
+                        colour: STRAIGHT,
+                        width: 2.6,
+                        dashed: true,
+                    },
+                ])
+                .collect(),
         }],
         legend_width: 270.0,
         without_strays: true,
@@ -62,10 +76,13 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         // A white line needs a dark ground.
         let ground = [canvas::place(at[0], end + 43.5), canvas::place(at[0] + 24.0, end + 56.5)];
         area.draw(&Rectangle::new(ground, viridis(0.1).filled()))?;
-        let lines = [
+        let mut lines = vec![
             Entry { text: "10 % of the top speed", colour: SURFACE, dashed: false },
             Entry { text: "straight line through its middle", colour: STRAIGHT, dashed: true },
         ];
+        if is_measured {
+            lines.push(Entry { text: "measured", colour: MEASURED, dashed: false });
+        }
         canvas::legend(area, at[0], end + 50.0, &lines)
     })
 }

@@ -1,22 +1,25 @@
-//! Pictures: SVG and PNG of the same drawing, side by side in `post/`.
+//! Pictures: SVG, PNG and PDF of the same drawing, side by side in `post/`.
 
 mod basal;
 mod basal_normalised;
 mod canvas;
+mod coloured;
 mod energies;
 mod failure_plane;
 mod flow;
+mod front;
 mod layers;
 mod panels;
 mod particles;
 mod profiles;
 mod runout;
 mod series;
+mod shear;
 mod stress;
 mod surfaces;
 mod top_view;
 
-use crate::{analysis::Analysis, failure::Failure};
+use crate::{analysis::Analysis, failure::Failure, geometry::Law};
 use std::path::{Path, PathBuf};
 
 /// Draws everything the run has to show, and returns the paths.
@@ -28,14 +31,17 @@ pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Fail
     let all = [
         profiles::draw,
         surfaces::draw,
+        front::draw,
         runout::draw,
         series::draw,
         energies::draw,
         particles::draw,
+        coloured::draw,
         layers::draw,
         flow::draw,
         failure_plane::draw,
         top_view::draw,
+        shear::draw,
         stress::draw,
         basal::draw,
         basal_normalised::draw,
@@ -44,6 +50,11 @@ pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Fail
         paths.extend(draw(analysis, folder)?);
     }
     Ok(paths)
+}
+
+/// The law to draw; none where measured curves of the very case are given.
+fn law(a: &Analysis) -> Option<Law> {
+    a.geometry.law().filter(|_| a.reference.is_none())
 }
 
 /// How lengths are shown: over r0 where there is one, else in m.

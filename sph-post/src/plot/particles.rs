@@ -12,7 +12,7 @@ use plotters::style::RGBColor;
 use std::path::{Path, PathBuf};
 
 /// Shades of colour: squares of one shade become one path.
-const SHADES: f64 = 96.0;
+pub const SHADES: f64 = 96.0;
 
 /// Draws `particles.svg` and `.png`.
 pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {

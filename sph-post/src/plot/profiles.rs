@@ -1,14 +1,13 @@
 //! Surfaces of the deposit over time.
 
 use super::canvas::{self, Entry, Frame, MARGIN, SMALL, viridis};
-use super::{Lengths, Times, title};
+use super::{Lengths, Times, law, title};
 use crate::{
     analysis::{Analysis, spread},
     deposit::Profile,
     failure::Failure,
     geometry::Geometry,
 };
-use formats::laws;
 use plotters::style::{
     RGBColor,
     text_anchor::{HPos, VPos},
@@ -28,13 +27,13 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let shown = spread(a.moments.len(), CURVES);
     let curves: Vec<(f64, Vec<(f64, f64)>)> =
         shown.iter().map(|&k| (a.moments[k].time, outline(g, &a.moments[k].deposit.profile, lengths.unit))).collect();
-    let reference = g.cylinder_aspect.map(|a| (laws::lube_runout(a), laws::lube_height(a)));
+    let law = law(a).filter(|l| l.run_out.is_some() || l.height.is_some());
     let (mut x, mut top) = ([0.0_f64, 0.0_f64], 0.0_f64);
     for &(s, h) in curves.iter().flat_map(|c| &c.1) {
         x = [x[0].min(s), x[1].max(s)];
         top = top.max(h);
     }
-    if let Some((run_out, _)) = reference {
+    if let Some(run_out) = law.and_then(|l| l.run_out) {
         x[1] = x[1].max(1.0 + run_out);
     }
     x = [x[0] * 1.04, x[1] * 1.04];
@@ -43,7 +42,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let scale = (MOST[0] / (x[1] - x[0])).min(MOST[1] / y[1]);
     let size = [((x[1] - x[0]) * scale).max(LEAST[0]), (y[1] * scale).max(LEAST[1])];
     let (x, y) = ([x[0], x[0] + size[0] / scale], [0.0, size[1] / scale]);
-    let below = if reference.is_some() { 30.0 } else { 0.0 };
+    let below = if law.is_some() { 30.0 } else { 0.0 };
     let inner = [MARGIN[0] + 8.0, 58.0, MARGIN[0] + 8.0 + size[0], 58.0 + size[1]];
     let paper = [(inner[2] + 90.0).max(560.0) as i32, (inner[3] + MARGIN[1] + 8.0 + below) as i32];
     canvas::save(folder, "profiles", paper, |area| {
@@ -64,14 +63,17 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
             canvas::curve(&mut chart, points, canvas::pen(colour, 1.7))?;
         }
         canvas::colour_bar(area, inner[2] + 20.0, [inner[1] + 14.0, inner[3]], [0.0, last], &times.text)?;
-        if let Some((run_out, height)) = reference {
+        if let Some(law) = law {
             let grey = RGBColor(90, 90, 90);
-            canvas::dashed(&mut chart, (1.0 + run_out, y[0]), (1.0 + run_out, y[1]), grey)?;
-            if let Some(height) = height {
+            if let Some(run_out) = law.run_out {
+                canvas::dashed(&mut chart, (1.0 + run_out, y[0]), (1.0 + run_out, y[1]), grey)?;
+            }
+            if let Some(height) = law.height {
                 canvas::dashed(&mut chart, (x[0], height), (x[1], height), grey)?;
             }
-            let known = if height.is_some() { "run-out and height" } else { "run-out" };
-            let text = format!("final {known} of Lube et al. (2004)");
+            let known: Vec<&str> =
+                [law.run_out.map(|_| "run-out"), law.height.map(|_| "height")].into_iter().flatten().collect();
+            let text = format!("final {} of {}", known.join(" and "), law.source);
             let entry = Entry { text: &text, colour: grey, dashed: true };
             canvas::legend(area, inner[0], inner[3] + MARGIN[1] + 16.0, &[entry])?;
         }

@@ -1,9 +1,9 @@
 //! Run-out and energies over time.
 
 use super::canvas::{self, CURVES, Entry, Frame, MARGIN, SMALL};
-use super::{Times, title};
+use super::{Times, law, title};
 use crate::{analysis::Analysis, failure::Failure};
-use formats::{laws, space::Space};
+use formats::space::Space;
 use plotters::style::{
     RGBColor,
     text_anchor::{HPos, VPos},
@@ -21,7 +21,9 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let times = Times::of(a);
     let (fronts, fronts_name) = fronts(a, times.unit);
     let (energies, energies_name) = energies(a, times.unit);
-    let reference = a.geometry.cylinder_aspect.map(laws::lube_runout);
+    let law = law(a);
+    let reference = law.and_then(|l| l.run_out);
+    let known = law.map_or(String::new(), |l| format!("final, {}", l.source));
     // A history may be ahead of the snapshots, while the run goes on.
     let ends = [Some(a.last().time), a.history.as_ref().and_then(|h| h.times().last().copied())];
     let last = (ends.into_iter().flatten().fold(0.0, f64::max) / times.unit).max(1e-9);
@@ -51,7 +53,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
             if let Some(run_out) = reference {
                 let grey = RGBColor(90, 90, 90);
                 canvas::dashed(&mut chart, (0.0, run_out), (last, run_out), grey)?;
-                entries.push(Entry { text: "final, Lube et al. (2004)", colour: grey, dashed: true });
+                entries.push(Entry { text: &known, colour: grey, dashed: true });
             }
             canvas::legend(area, inner[2] + 18.0, inner[1] + 12.0, &entries)?;
         }

@@ -25,7 +25,11 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         sections().flat_map(|s| &s.1.stress_zz).map(|s| -s / weight).filter(|p| p.is_finite()).collect();
     all.sort_by(f64::total_cmp);
     let highest = all.get((SEEN * all.len() as f64) as usize).copied().unwrap_or(0.0).max(1e-6);
-    let panel = |(moment, section)| Panel { moment, patches: cells(a, section, weight * highest), lines: Vec::new() };
+    let panel = |(moment, section)| Panel {
+        moment,
+        patches: cells(a, section, &section.stress_zz, |s| -s / (weight * highest)),
+        lines: Vec::new(),
+    };
     let picture = Picture {
         name: "stress-sections",
         what: match (g.space.dimension(), g.radial) {
@@ -42,8 +46,8 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     })
 }
 
-/// The section's cells, shade by shade.
-fn cells(a: &Analysis, section: &Section, most: f64) -> Vec<Patch> {
+/// The section's cells with means of `values`, shade by shade; `part` says how far on viridis a value lies.
+pub fn cells(a: &Analysis, section: &Section, values: &[f64], part: impl Fn(f64) -> f64) -> Vec<Patch> {
     let g = &a.geometry;
     let mut step = 1;
     while section.bins.div_ceil(step) * section.rows.div_ceil(step) > MOST {
@@ -53,10 +57,10 @@ fn cells(a: &Analysis, section: &Section, most: f64) -> Vec<Patch> {
     for j in (0..section.rows).step_by(step) {
         for k in (0..section.bins).step_by(step) {
             let block = (j..(j + step).min(section.rows))
-                .flat_map(|j| (k..(k + step).min(section.bins)).map(move |k| section.stress_zz[j * section.bins + k]));
+                .flat_map(|j| (k..(k + step).min(section.bins)).map(move |k| values[j * section.bins + k]));
             let (sum, count) = block.filter(|s| s.is_finite()).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
             if count > 0.0 {
-                let shade = (-sum / count / most * SHADES).clamp(0.0, SHADES) as u32;
+                let shade = (part(sum / count) * SHADES).clamp(0.0, SHADES) as u32;
                 let half = 0.5 * step as f64 * g.dx;
                 let at = [section.along(g, k) - 0.5 * g.dx + half, j as f64 * g.dx + half];
                 cells.push((shade, Patch { at, half: [half * 1.15; 2], colour: viridis(f64::from(shade) / SHADES) }));

@@ -26,15 +26,17 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
             (format!("t = {:.2} T", m.time / scale), outline(g, &m.deposit.profile, lengths.unit))
         })
         .collect();
-    let points = || curves.iter().flat_map(|c| &c.1);
+    let measured: Vec<(f64, f64)> =
+        a.reference.iter().flat_map(|r| &r.surface).map(|p| scaled(p, lengths.unit)).collect();
+    let points = || curves.iter().flat_map(|c| &c.1).chain(&measured);
     let x = points().fold([0.0_f64; 2], |x, p| [x[0].min(p.0), x[1].max(p.0)]).map(|x| x * 1.04);
     let top = 1.06 * points().fold(1e-9_f64, |top, p| top.max(p.1));
     // Equal aspect; a range too short for its least size is shown longer.
     let scale = (MOST[0] / (x[1] - x[0])).min(MOST[1] / top);
     let size = [((x[1] - x[0]) * scale).max(LEAST[0]), (top * scale).max(LEAST[1])];
     let inner = [MARGIN[0] + 8.0, 58.0, MARGIN[0] + 8.0 + size[0], 58.0 + size[1]];
-    let low = inner[3].max(inner[1] + 20.0 * curves.len() as f64);
-    let paper = [(inner[2] + 150.0).max(560.0) as i32, (low + MARGIN[1] + 8.0) as i32];
+    let low = inner[3].max(inner[1] + 20.0 * (curves.len() + 1) as f64);
+    let paper = [(inner[2] + 165.0).max(560.0) as i32, (low + MARGIN[1] + 8.0) as i32];
     canvas::save(folder, "surfaces", paper, |area| {
         canvas::write(area, &title(a, "surface"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
         let explained: Vec<String> =
@@ -54,6 +56,16 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
             canvas::curve(&mut chart, points, canvas::pen(colour, 2.0))?;
             entries.push(Entry { text, colour, dashed: false });
         }
+        if !measured.is_empty() {
+            canvas::marks(&mut chart, &measured)?;
+            let at = [inner[2] + 18.0, inner[1] + 12.0 + 20.0 * entries.len() as f64];
+            canvas::mark_legend(area, at, "measured, final")?;
+        }
         canvas::legend(area, inner[2] + 18.0, inner[1] + 12.0, &entries)
     })
+}
+
+/// A point in units of `unit`.
+fn scaled(p: &[f64; 2], unit: f64) -> (f64, f64) {
+    (p[0] / unit, p[1] / unit)
 }

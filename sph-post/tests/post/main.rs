@@ -1,6 +1,7 @@
 //! `sph-post` on run folders made by hand, with known answers.
 
 mod folder;
+mod report;
 
 use folder::{Made, SCENES, block, hydrostatic, spreading};
 use formats::{exit, folder::RunFolder, results};
@@ -84,27 +85,43 @@ fn everything_is_written_and_told() {
     for scene in SCENES {
         let made = Made::new(scene.text);
         spreading(&made);
-        let called = post(made.run.path(), &["--basal-height", "8 mm"]);
+        let measured = made.run.path().join("measured.csv");
+        std::fs::write(&measured, "curve,x_m,y_m\nfree_surface,0.05,0.06\nfree_surface,0.1,0.03\n").unwrap();
+        let asked = ["--basal-height", "8 mm", "--grain-diameter", "1 mm", "--color", "pressure", "--color", "body"];
+        let asked = [&asked[..], &["--reference", measured.to_str().unwrap()]].concat();
+        let called = post(made.run.path(), &asked);
         assert_eq!(called.code, Some(exit::DONE), "{}", called.err);
-        let mut names = vec!["results.nc", "history.nc", "summary.json", "profile_final.csv"];
+        let drawn = std::fs::read_to_string(made.run.post().join("surfaces.svg")).unwrap();
+        assert_eq!(
+            drawn.matches("<circle").count(),
+            2 * 2 + 1,
+            "two measured points, each with its rim, and the legend"
+        );
+        let mut names = vec!["results.nc", "history.nc", "summary.json", "profile_final.csv", "report.html"];
         let pictures = [
             "profiles",
             "surfaces",
+            "front",
             "run-out",
             "time-series",
             "energies",
             "particles",
+            "particles-pressure",
+            "particles-body",
             "layers-horizontal",
             "layers-vertical",
             "static",
             "static-share",
+            "shear-rate",
+            "inertial-number",
             "stress-sections",
             "basal-stress",
             "basal-stress-normalised",
             "top-view",
         ];
         let of_space = &pictures[..pictures.len() - usize::from(scene.name != "3d")];
-        let files: Vec<String> = of_space.iter().flat_map(|p| ["svg", "png"].map(|k| format!("{p}.{k}"))).collect();
+        let files: Vec<String> =
+            of_space.iter().flat_map(|p| ["svg", "png", "pdf"].map(|k| format!("{p}.{k}"))).collect();
         names.extend(files.iter().map(String::as_str));
         for name in &names {
             let path = made.run.post().join(name);
@@ -143,8 +160,11 @@ fn everything_is_written_and_told() {
         assert!(from_history("energy_closure").iter().all(|e| e.abs() < 1e-14));
         // Twice the same: same bits.
         let before = std::fs::read(made.run.post().join("profiles.svg")).unwrap();
-        assert_eq!(post(made.run.path(), &["--basal-height", "8 mm", "--quiet"]).err, "");
-        assert_eq!(before, std::fs::read(made.run.post().join("profiles.svg")).unwrap());
+        assert_eq!(post(made.run.path(), &[&asked[..], &["--quiet"]].concat()).err, "");
+        // PDF has the pages' text as text: fonts are inside.
+        let pdf = std::fs::read(made.run.post().join("profiles.pdf")).unwrap();
+        assert!(pdf.starts_with(b"%PDF-") && pdf.windows(10).any(|w| w == b"/FontFile2" || w == b"/FontFile3"));
+        assert!(before == std::fs::read(made.run.post().join("profiles.svg")).unwrap(), "other bytes");
         if let Some(keep) = std::env::var_os("SPH_POST_KEEP") {
             let keep = Path::new(&keep).join(scene.name);
             std::fs::create_dir_all(&keep).unwrap();
@@ -171,7 +191,9 @@ fn what_lies_inside_has_known_numbers() {
             *v = [speed * cos, 0.0, -speed * sin];
         }
         made.snapshot(0, 0.0, 0, &rows);
-        let called = post(made.run.path(), &["--layers", "4", "--static-speed", "50 cm/s", "--failure-time", "1 ms"]);
+        let asked =
+            ["--layers", "4", "--static-speed", "50 cm/s", "--failure-time", "1 ms", "--grain-diameter", "2 mm"];
+        let called = post(made.run.path(), &asked);
         assert_eq!(called.code, Some(exit::DONE), "{}", called.err);
         let summary: serde_json::Value =
             serde_json::from_slice(&std::fs::read(made.run.post().join("summary.json")).unwrap()).unwrap();
@@ -206,6 +228,20 @@ fn what_lies_inside_has_known_numbers() {
         }
         let top_of_scale = stress.iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::min);
         close(top_of_scale, -2600.0 * 9.81 * (0.1 - z[0]), 1e-6, what);
+        // Across the plane the speed grows by 1 m/s in 4 spacings, all of it shear; in 3-D it is along x, whatever the angle.
+        let (rate, inertial) = (read(&made.run, "section_shear_rate"), read(&made.run, "section_inertial_number"));
+        let inside = |c: usize| {
+            let (r, z) = (bins[c % bins.len()], z[c / bins.len()]);
+            r > 0.02 && z < 0.08 && (outside(r, z) / dx).abs() < 0.2
+        };
+        let within: Vec<usize> = (0..rate.len()).filter(|c| scene.name != "3d" && inside(*c)).collect();
+        assert!(within.len() > 3 || scene.name == "3d", "{what}");
+        for c in within {
+            assert!((rate[c] * 4.0 * dx - 1.0).abs() < 0.1, "{what}: {} of {}", rate[c], 0.25 / dx);
+            let pressure = made.scene.gravity[2].abs() * 2600.0 * (0.1 - z[c / bins.len()]) * 13.0 / 21.0;
+            let expected = rate[c] * 0.002 / (pressure / 2600.0).sqrt();
+            close(inertial[c], expected, 0.02, what);
+        }
         // There is no history, nor a column that says what work was done.
         assert!(summary["energy_closure"].is_null() && !made.run.post().join("energies.png").exists());
         assert_eq!((number("stray_particles"), number("runout_effective")), (0.0, number("runout_thickness")));
