@@ -16,6 +16,7 @@ pub mod laws;
 pub mod lock;
 pub mod outputs;
 pub mod provenance;
+pub mod raster;
 pub mod results;
 pub mod scene;
 pub mod schema;
