@@ -119,7 +119,7 @@ impl Analysis {
             Err(error) => return Err(FileError::reading(&path, &error).into()),
         };
         let scene = Scene::read(&path.display().to_string(), &text)?;
-        let hash = Scene::hash(&text);
+        let hash = scene.hash_of(&text);
         let index = Index::read(folder)?.unwrap_or_default();
         let files = files(folder, &index, &hash)?;
         let geometry = Geometry::new(&scene);

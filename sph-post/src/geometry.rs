@@ -145,6 +145,8 @@ fn extent(body: &Body, space: Space, cut: bool) -> [f64; 2] {
 fn runs_right(body: &Body, radial: bool) -> bool {
     match body.shape {
         Shape::Cylinder { .. } => radial,
+        // Down the slope, wherever that is.
+        Shape::Release(_) => false,
         Shape::Box { .. } => true,
         Shape::Wedge { falls_left, .. } => !falls_left,
     }
