@@ -14,6 +14,7 @@ use crate::{
     sample::Sampler,
     scatter::Scatter,
     section::{self, Section},
+    terrain::{self, Gatherer, Maps},
 };
 use formats::{
     folder::RunFolder,
@@ -96,6 +97,8 @@ pub struct Analysis {
     pub static_speed: f64,
     /// What the run wrote while it went on, if it has begun.
     pub history: Option<History>,
+    /// Maps on the terrain, in three dimensions.
+    pub maps: Option<Maps>,
     /// Where the energy went, if the history tells.
     pub partition: Option<Partition>,
 }
@@ -129,14 +132,17 @@ impl Analysis {
         let shown = spread(files.len(), PANELS);
         let sections = geometry.time_scale().map_or_else(|| shown.clone(), |scale| at_times(&times, &SHOWN, scale));
         let failure = Some(choices.failure_time.value(&geometry)).filter(|t| t.is_finite()).map(|t| nearest(&times, t));
-        let layers = start(folder, &files)?.map(|start| Layers::new(&geometry, &start, choices.layers));
+        let layers = start(folder, &files)?
+            .map(|start| Layers::new(&geometry, &terrain::places_levelled(&scene, start), choices.layers));
         let mut moments = Vec::with_capacity(files.len());
+        let mut maps = Gatherer::new(&scene);
         for (number, (_, file)) in files.iter().enumerate() {
             let inside = sections.contains(&number);
             let drawn = inside || shown.contains(&number) || failure == Some(number);
             let wanted = Wanted { level, static_speed, layers: layers.as_ref(), inside, drawn };
-            moments.push(moment(&geometry, file, &wanted)?);
+            moments.push(moment(&scene, &geometry, file, &wanted, maps.as_mut())?);
         }
+        let maps = maps.map(Gatherer::finish);
         let history = History::read(folder, &index)?;
         let partition = history.as_ref().and_then(Partition::of);
         Ok(Self {
@@ -152,6 +158,7 @@ impl Analysis {
             layers,
             static_speed,
             history,
+            maps,
             partition,
         })
     }
@@ -191,8 +198,19 @@ struct Wanted<'a> {
     drawn: bool,
 }
 
-fn moment(geometry: &Geometry, file: &Path, wanted: &Wanted) -> Result<Moment, Failure> {
+fn moment(
+    scene: &Scene,
+    geometry: &Geometry,
+    file: &Path,
+    wanted: &Wanted,
+    maps: Option<&mut Gatherer>,
+) -> Result<Moment, Failure> {
     let (header, rows) = snapshot::read(file)?;
+    if let Some(maps) = maps {
+        maps.add(header.time, &rows);
+    }
+    let energy = Energy::new(geometry, &rows);
+    let rows = terrain::levelled(scene, rows);
     let sampler = Sampler::new(geometry, &rows);
     let deposit = Deposit::new(geometry, &rows, &sampler);
     let basal = Basal::new(geometry, &rows, &sampler, &deposit, wanted.level);
@@ -203,7 +221,7 @@ fn moment(geometry: &Geometry, file: &Path, wanted: &Wanted) -> Result<Moment, F
         time: header.time,
         step: header.step,
         particles: rows.len(),
-        energy: Energy::new(geometry, &rows),
+        energy,
         layer_tops: layers.map(|layers| layers.tops(geometry, &rows, &deposit.profile)),
         flow: Flow::new(geometry, &rows, &section, wanted.static_speed),
         failure_plane: FailurePlane::new(geometry, &rows, &deposit, &section, plane),

@@ -53,6 +53,18 @@ impl Release {
         }
     }
 
+    /// The largest thickness of its rasters, or the one that it has everywhere, m.
+    pub fn thickest(&self) -> f64 {
+        match &self.depth {
+            Depth::Constant(depth) => *depth,
+            Depth::Raster(grid) => grid.range()[1].max(0.0),
+            Depth::Surface(grid) => {
+                let known = (0..grid.values.len()).filter(|&c| !grid.missing[c]);
+                known.map(|c| grid.values[c] - self.ground.values[c]).fold(0.0, f64::max)
+            }
+        }
+    }
+
     /// Lower and upper end along x and y, m.
     fn footprint(&self) -> [[f64; 2]; 2] {
         let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];

@@ -14,6 +14,7 @@ mod runout;
 mod series;
 mod stress;
 mod surfaces;
+mod terrain;
 mod top_view;
 
 use crate::{analysis::Analysis, failure::Failure};
@@ -36,6 +37,7 @@ pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Fail
         flow::draw,
         failure_plane::draw,
         top_view::draw,
+        terrain::draw,
         stress::draw,
         basal::draw,
         basal_normalised::draw,
