@@ -11,7 +11,10 @@ use formats::{
     space::Space,
 };
 
-/// Maps on the part of the raster that the material has reached, row by row along x from south to north.
+/// Most values of a map over time; where a raster has more, the maps show the part that the material has reached.
+const MOST_VALUES: usize = 1 << 24;
+
+/// Maps on the raster or, where that is large, on the part of it that the material has reached, row by row along x from south to north.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Maps {
     /// The terrain.
@@ -90,7 +93,11 @@ impl<'a> Gatherer<'a> {
             }
         }
         // A margin, so that nothing ends at the border of the map.
+        let whole = ground.values.len() * self.layers.len() <= MOST_VALUES;
         let range = |a: usize| {
+            if whole {
+                return (0, ground.size[a]);
+            }
             let [low, high] = if ends[a][0] > ends[a][1] { [0, 0] } else { ends[a] };
             (low.saturating_sub(2), (high + 3).min(ground.size[a]))
         };

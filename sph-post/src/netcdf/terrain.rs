@@ -32,8 +32,8 @@ pub fn terrain(a: &Analysis) -> Option<Dataset> {
     add("speed", &format!("{fast}, where it is thick enough"), "m s-1", "", true, all(&maps.speed));
     let most = |what: &str| format!("largest {what}, of all snapshots");
     let largest = maps.largest(&maps.thickness);
-    add("max_thickness", &most(thick), "m", "area: mean t: maximum", false, largest);
-    add("max_speed", &most(fast), "m s-1", "t: maximum", false, maps.largest(&maps.speed));
+    add("max_thickness", &most(thick), "m", "area: mean time: maximum", false, largest);
+    add("max_speed", &most(fast), "m s-1", "time: maximum", false, maps.largest(&maps.speed));
     let long = "time at which the thickness first comes up to threshold_thickness, linear between snapshots";
     add("arrival_time", long, "s", "", false, maps.arrival());
     add("deposit_thickness", &format!("{thick}, at the end"), "m", "area: mean", false, maps.deposit());

@@ -1,7 +1,7 @@
 //! What a landslide did, on a relief of its terrain.
 
 use super::{
-    canvas::{self, Frame, INK, MARGIN, SMALL, viridis},
+    canvas::{self, Frame, MARGIN, SMALL, viridis},
     title,
 };
 use crate::{analysis::Analysis, failure::Failure, terrain::Maps};
@@ -28,7 +28,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let Some(maps) = &a.maps else { return Ok(Vec::new()) };
     let ends = |axis: usize| {
         let half = 0.5 * maps.terrain.ground.cell[axis];
-        [maps.coordinate(axis, 0) - half, maps.coordinate(axis, maps.size[axis] - 1) + half]
+        [place_of(maps, axis, 0) - half, place_of(maps, axis, maps.size[axis] - 1) + half]
     };
     let (x, y) = (ends(0), ends(1));
     let scale = (MOST[0] / (x[1] - x[0])).min(MOST[1] / (y[1] - y[0]));
@@ -45,8 +45,13 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     canvas::save(folder, "terrain", paper.map(|s| s as i32), |area| {
         canvas::write(area, &title(a, "on the terrain"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
         let line = interval(maps);
-        let explained =
-            format!("lines of equal height every {} m; coordinates of {}", canvas::number(line), maps.terrain.file);
+        let [east, north, _] = maps.terrain.origin;
+        let at = if [east, north] == [0.0; 2] {
+            String::new()
+        } else {
+            format!("; 0 is at {east} m, {north} m of the raster")
+        };
+        let explained = format!("lines of equal height every {} m{at}", canvas::number(line));
         canvas::write(area, &explained, 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;
         for (k, (name, unit, field)) in panels.iter().enumerate() {
             let (left, top) = (origin[0] + step[0] * (k % 2) as f64, origin[1] + step[1] * (k / 2) as f64);
@@ -56,15 +61,20 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
             canvas::write(area, name, left, top - 6.0, canvas::style(SMALL, HPos::Left, VPos::Bottom))?;
             canvas::axes(area, inner, &frame)?;
             let most = field.iter().copied().filter(|v| v.is_finite()).fold(0.0_f64, f64::max);
-            for (colour, cell) in cells(maps, field, most, line) {
+            for (colour, cell) in cells(maps, field, most) {
                 let (at, half) = (
-                    [0, 1].map(|a| maps.coordinate(a, cell[a])),
+                    [0, 1].map(|a| place_of(maps, a, cell[a])),
                     [0, 1].map(|a| 0.5 * maps.terrain.ground.cell[a] * cell[2] as f64),
                 );
                 let px = [at[0] - half[0], at[0] + half[0]].map(|v| (inner[0] + (v - x[0]) * scale).min(inner[2]));
                 let py = [at[1] - half[1], at[1] + half[1]].map(|v| (inner[3] - (v - y[0]) * scale).max(inner[1]));
                 let corners = [canvas::place(px[0].max(inner[0]), py[0].min(inner[3])), canvas::place(px[1], py[1])];
                 area.draw(&Rectangle::new(corners, colour.filled()))?;
+            }
+            for ends in lines(maps, line) {
+                let on = |p: [f64; 2]| (inner[0] + (p[0] - x[0]) * scale, inner[3] - (p[1] - y[0]) * scale);
+                let pen = canvas::pen(RGBColor(110, 100, 90), 0.6);
+                canvas::polyline(area, &[on(ends[0]), on(ends[1])], pen, false)?;
             }
             let bar = [top + 10.0, (top + 10.0 + size[1].min(240.0)).max(top + 110.0)];
             canvas::colour_bar(area, left + size[0] + 16.0, bar, [0.0, most.max(1e-9)], &format!("({unit})"))?;
@@ -87,7 +97,7 @@ fn interval(maps: &Maps) -> f64 {
 }
 
 /// Colour of each cell, its numbers along x and y, and how many cells it stands for along each.
-fn cells(maps: &Maps, field: &[f64], most: f64, line: f64) -> Vec<(RGBColor, [usize; 3])> {
+fn cells(maps: &Maps, field: &[f64], most: f64) -> Vec<(RGBColor, [usize; 3])> {
     let ([nx, ny], ground) = (maps.size, maps.ground());
     let coarse = nx.max(ny).div_ceil(CELLS);
     let mut out = Vec::new();
@@ -96,7 +106,7 @@ fn cells(maps: &Maps, field: &[f64], most: f64, line: f64) -> Vec<(RGBColor, [us
             let c = j * nx + i;
             let colour = match field[c] {
                 v if v.is_finite() => viridis((v / most).clamp(0.0, 1.0)),
-                _ => relief(maps, &ground, i, j, line),
+                _ => relief(maps, &ground, i, j),
             };
             out.push((colour, [i, j, coarse]));
         }
@@ -104,8 +114,8 @@ fn cells(maps: &Maps, field: &[f64], most: f64, line: f64) -> Vec<(RGBColor, [us
     out
 }
 
-/// Grey by the light from the north-west; a line of equal height passes where a neighbour lies in another interval.
-fn relief(maps: &Maps, ground: &[f64], i: usize, j: usize, line: f64) -> RGBColor {
+/// Grey by the light from the north-west.
+fn relief(maps: &Maps, ground: &[f64], i: usize, j: usize) -> RGBColor {
     let [nx, ny] = maps.size;
     let z = ground[j * nx + i];
     if z.is_nan() {
@@ -113,13 +123,46 @@ fn relief(maps: &Maps, ground: &[f64], i: usize, j: usize, line: f64) -> RGBColo
     }
     let other = |i: usize, j: usize| Some(ground[j * nx + i]).filter(|z| z.is_finite()).unwrap_or(z);
     let (east, north) = (other((i + 1).min(nx - 1), j), other(i, (j + 1).min(ny - 1)));
-    if (east / line).floor() != (z / line).floor() || (north / line).floor() != (z / line).floor() {
-        let mix = |ink: u8| (f64::from(ink) * 0.35 + 255.0 * 0.45) as u8;
-        return RGBColor(mix(INK.0), mix(INK.1), mix(INK.2));
-    }
     let cell = maps.terrain.ground.cell;
     let slope = [(east - z) / cell[0], (north - z) / cell[1]];
     let light = (0.5 * slope[0] - 0.5 * slope[1] + 0.7) / (1.0 + slope[0] * slope[0] + slope[1] * slope[1]).sqrt();
     let grey = (150.0 + 105.0 * light.clamp(0.0, 1.0)) as u8;
     RGBColor(grey, grey, grey)
+}
+
+/// Pieces of the lines of equal height: ends in the coordinates of the scene. In each square between the middles of four
+/// cells, or as many rows and columns further as are shown as one, a line crosses two sides or all four.
+fn lines(maps: &Maps, interval: f64) -> Vec<[[f64; 2]; 2]> {
+    let ([nx, ny], ground) = (maps.size, maps.ground());
+    let coarse = nx.max(ny).div_ceil(CELLS);
+    let place = |i: usize, j: usize| [place_of(maps, 0, i), place_of(maps, 1, j)];
+    let mut out = Vec::new();
+    for j in (0..ny.saturating_sub(coarse)).step_by(coarse) {
+        for i in (0..nx.saturating_sub(coarse)).step_by(coarse) {
+            let corners = [(i, j), (i + coarse, j), (i + coarse, j + coarse), (i, j + coarse)];
+            let z = corners.map(|(i, j)| ground[j * nx + i] / interval);
+            if z.iter().any(|z| z.is_nan()) {
+                continue;
+            }
+            let (low, high) = (z.iter().copied().fold(f64::MAX, f64::min), z.iter().copied().fold(f64::MIN, f64::max));
+            for level in low.ceil() as i64..=high.floor() as i64 {
+                let level = level as f64;
+                let crossings: Vec<[f64; 2]> = (0..4)
+                    .filter(|&k| (z[k] < level) != (z[(k + 1) % 4] < level))
+                    .map(|k| {
+                        let (next, part) = ((k + 1) % 4, (level - z[k]) / (z[(k + 1) % 4] - z[k]));
+                        let (a, b) = (place(corners[k].0, corners[k].1), place(corners[next].0, corners[next].1));
+                        [0, 1].map(|axis| a[axis] + part * (b[axis] - a[axis]))
+                    })
+                    .collect();
+                out.extend(crossings.chunks_exact(2).map(|pair| [pair[0], pair[1]]));
+            }
+        }
+    }
+    out
+}
+
+/// Middle of a cell in the coordinates of the scene, m.
+fn place_of(maps: &Maps, axis: usize, n: usize) -> f64 {
+    maps.coordinate(axis, n) - maps.terrain.origin[axis]
 }
