@@ -2,7 +2,7 @@
 //! when the material came.
 //!
 //! Each particle is spread evenly over a square with the sides of the spacing, and its parts go to the cells they lie on: the
-//! volume on the map is that of the material.
+//! volume on the map is the mass over the density at the start. (Of particles that fly alone the density itself says little.)
 
 use formats::{
     raster::Grid,
@@ -27,7 +27,7 @@ pub struct Maps {
     pub least: f64,
     /// Times of the snapshots, s.
     pub times: Vec<f64>,
-    /// Vertical thickness at each time, m: volume over area.
+    /// Vertical thickness at each time, m: volume at the density of the start over area.
     pub thickness: Vec<Vec<f64>>,
     /// Speed at each time, m/s: that of the mean velocity of what lies on the cell. NaN where that is too thin.
     pub speed: Vec<Vec<f64>>,
@@ -47,6 +47,8 @@ struct Layer {
 pub struct Gatherer<'a> {
     terrain: &'a Terrain,
     dx: f64,
+    /// At the start, kg/m3.
+    density: f64,
     layers: Vec<Layer>,
 }
 
@@ -54,7 +56,7 @@ impl<'a> Gatherer<'a> {
     /// For a scene in three dimensions with a terrain; none for others.
     pub fn new(scene: &'a Scene) -> Option<Self> {
         let terrain = scene.terrain.as_ref().filter(|_| scene.space == Space::ThreeD)?;
-        Some(Self { terrain, dx: scene.spacing, layers: Vec::new() })
+        Some(Self { terrain, dx: scene.spacing, density: scene.material.density(), layers: Vec::new() })
     }
 
     /// Takes a snapshot; times must ascend.
@@ -64,7 +66,7 @@ impl<'a> Gatherer<'a> {
         let (mut volume, mut momentum) = (vec![0.0; nx * ny], vec![[0.0; 3]; nx * ny]);
         let (mut beyond, mut mass) = (0.0, 0.0);
         for row in 0..rows.len() {
-            let (x, v, bulk) = (rows.position[row], rows.velocity[row], rows.mass[row] / rows.density[row]);
+            let (x, v, bulk) = (rows.position[row], rows.velocity[row], rows.mass[row] / self.density);
             mass += rows.mass[row];
             let mut kept = 0.0;
             for (j, part_y) in parts(ground, 1, x[1], self.dx) {
@@ -210,7 +212,7 @@ mod tests {
             position: places.to_vec(),
             velocity: vec![[speed, 0.0, 0.0]; n],
             mass: vec![2000.0; n],
-            density: vec![2000.0; n],
+            density: vec![1000.0; n],
             ..Rows::default()
         }
     }
@@ -218,7 +220,7 @@ mod tests {
     #[test]
     fn volume_is_kept_and_times_are_interpolated() {
         let terrain = terrain();
-        let mut gatherer = Gatherer { terrain: &terrain, dx: 1.0, layers: Vec::new() };
+        let mut gatherer = Gatherer { terrain: &terrain, dx: 1.0, density: 2000.0, layers: Vec::new() };
         // One cubic metre half on each of two cells, then three of them on one cell, one half off the edge.
         let empty = [[-94.5 + 0.5, 5.0, 2.5]];
         gatherer.add(0.0, &rows(&empty, 1.0));

@@ -84,6 +84,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             p.x[i] = p.x[i] + self.periods.rounded(p.v[i] * dt);
         }
         self.mirrors.keep_inside(p);
+        self.walls.keep_above::<D, N, P::Space>(p, &self.periods, dt);
     }
 
     /// Density and stress of the owned particles, from the velocity gradient.

@@ -28,7 +28,7 @@ impl Slab {
         let end = self.end;
         format!(
             "space = \"plane-strain\"\nspacing = {SPACING}\ngravity = {gravity:?}\n\
-             [material.drucker-prager]\ndensity = 1500\nyoung = \"1 MPa\"\npoisson = 0.3\nfriction = 30\ncohesion = 0\n\
+             [material.drucker-prager]\ndensity = 1500\nyoung = \"0.3 MPa\"\npoisson = 0.3\nfriction = 30\ncohesion = 0\n\
              cone = \"plane-strain-isochoric\"\n[initial]\nstress = \"hydrostatic\"\n{body}\
              [end]\ntime = {end}\n[output]\nsnapshots = {}\nhistory = {}\n",
             0.5 * end,
@@ -162,13 +162,12 @@ fn k4_a_valley_keeps_the_mass() {
     let below: f64 = crate::history(&folder, "below_floor").last().copied().unwrap();
     println!("valley: {} particles, moved {:.2} m, {below} below", end.len(), middle(&end) - middle(&start));
     assert!(middle(&end) - middle(&start) > 15.0);
-    assert!(below <= 0.01 * end.len() as f64, "{below} of {} particles below the ground", end.len());
+    assert!(below <= 0.005 * end.len() as f64, "{below} of {} particles below the ground", end.len());
 
     let maps = folder.post().join("terrain.nc");
     let read = |name: &str| results::read(&maps, name).unwrap();
     let sum = |field: &[f64]| field.iter().filter(|v| v.is_finite()).map(|v| v * 25.0).sum::<f64>();
-    let lies: f64 = end.mass.iter().zip(&end.density).map(|(m, rho)| m / rho).sum();
-    assert!((sum(&read("deposit_thickness")) / lies - 1.0).abs() < 1e-9);
+    assert!((sum(&read("deposit_thickness")) / volume - 1.0).abs() < 1e-9);
     assert_eq!((read("x")[0], read("y")[15]), (4002.5, 8077.5));
     let (most, arrival) = (read("max_thickness"), read("arrival_time"));
     let reached = most.iter().zip(&arrival).filter(|(h, t)| **h >= 0.75 && t.is_finite()).count();

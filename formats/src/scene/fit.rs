@@ -152,8 +152,7 @@ impl Fit<'_> {
                 continue;
             }
             if let Some(terrain) = &self.setting.terrain
-                && let Some(reason) =
-                    release::misfit(&placed.body, terrain, self.space, self.spacing, self.setting.h_over_dx)
+                && let Some(reason) = release::misfit(&placed.body, terrain, self.space, self.spacing, self.setting)
             {
                 fault(reason);
                 continue;

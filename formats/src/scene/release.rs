@@ -300,15 +300,17 @@ pub(super) fn overlap(a: &Shape, b: &Shape, space: Space, dx: f64) -> bool {
 }
 
 /// Why a body does not fit the terrain, if it does not.
-pub(super) fn misfit(body: &Body, terrain: &Terrain, space: Space, dx: f64, h_over_dx: f64) -> Option<String> {
-    let (low, high) = bounds(&body.shape, space);
+pub(super) fn misfit(body: &Body, terrain: &Terrain, space: Space, dx: f64, setting: &Setting<'_>) -> Option<String> {
+    let (mut low, high) = bounds(&body.shape, space);
+    // Nothing is kept on the negative side of planes of symmetry.
+    (0..2).filter(|&a| setting.symmetry[a]).for_each(|a| low[a] = low[a].max(0.0));
     let (first, last) = terrain.ground.extent();
     let axes = if space == Space::ThreeD { 2 } else { 1 };
     if space == Space::PlaneStrain && !(first[1]..=last[1]).contains(&0.0) {
         let (from, to) = (first[1], last[1]);
         return Some(format!("the section y = 0 lies beyond the terrain, which reaches from y = {from} m to {to} m"));
     }
-    let reach = REACH * h_over_dx * dx;
+    let reach = REACH * setting.h_over_dx * dx;
     for [x, y] in places(low, high, space, dx) {
         let Some([foot, _]) = column(&body.shape, space, x, y) else { continue };
         let at = [x, y];

@@ -128,6 +128,23 @@ impl WallLattice {
         self.terrain.as_ref().map(|floor| floor.terrain.height(x, y))
     }
 
+    /// Is there a terrain?
+    pub fn has_terrain(&self) -> bool {
+        self.terrain.is_some()
+    }
+
+    /// Where a point lies below the ground: the ground's normal, the distance to the plane across it, m, and whether the ground
+    /// is smooth.
+    pub fn below_ground(&self, x: [f64; 3]) -> Option<([f64; 3], f64, bool)> {
+        let floor = self.terrain.as_ref()?;
+        let at = self.fold(x);
+        let depth = floor.terrain.height(at[0], at[1]) - x[2];
+        (depth > 0.0).then(|| {
+            let normal = self.normal(floor, x);
+            (normal, depth * normal[2], floor.terrain.slip == Slip::FreeSlip)
+        })
+    }
+
     /// Lower bound of the distance to the ground, m; negative below it, infinite without a terrain.
     fn above_ground(&self, x: [f64; 3]) -> f64 {
         let Some(floor) = &self.terrain else { return f64::INFINITY };

@@ -24,8 +24,10 @@ pub fn terrain(a: &Analysis) -> Option<Dataset> {
         }
         d.variable(if crs.is_some() { v.with("grid_mapping", "crs") } else { v });
     };
-    let (thick, fast) =
-        ("vertical thickness of the material: volume over area", "speed of the mean velocity of the column");
+    let (thick, fast) = (
+        "vertical thickness of the material: mass over area and the density at the start",
+        "speed of the mean velocity of the column",
+    );
     let all = |fields: &[Vec<f64>]| fields.concat();
     add("ground", "height of the ground", "m", "", false, maps.ground());
     add("thickness", thick, "m", "area: mean", true, all(&maps.thickness));

@@ -7,6 +7,7 @@
 
 use crate::algebra::Vector;
 use crate::boundary::mirror::reflect_stress;
+use crate::boundary::periodic::Periods;
 use crate::neighbors::{Neighbors, blocks_order};
 use crate::particles::Particles;
 use crate::physics::Kernel;
@@ -42,6 +43,34 @@ impl Walls {
     /// Signed distance of a point to the nearest wall of any kind, m.
     pub fn distance<const D: usize, const N: usize, S: Space<D, N>>(&self, x: Vector<D>) -> f64 {
         self.lattice.distance(S::to_disk(x))
+    }
+
+    /// Puts owned particles back that have come below a terrain in a drift of length `dt`: the virtual particles carry what is
+    /// dense, but not what flies alone. They lose the velocity into the ground and, unless that is smooth, as much of that along
+    /// it; nothing moves further than it would have gone without the ground.
+    pub fn keep_above<const D: usize, const N: usize, S: Space<D, N>>(
+        &self,
+        p: &mut Particles<D, N>,
+        periods: &Periods<D>,
+        dt: f64,
+    ) {
+        if !self.lattice.has_terrain() {
+            return;
+        }
+        for i in 0..p.owned {
+            let Some((n, depth, smooth)) = self.lattice.below_ground(S::to_disk(p.x[i])) else { continue };
+            let v = S::to_disk(p.v[i]);
+            let into: f64 = -(0..3).map(|a| v[a] * n[a]).sum::<f64>();
+            if into <= 0.0 {
+                continue;
+            }
+            let back = depth.min(2.0 * into * dt);
+            p.x[i] = p.x[i] + periods.rounded(S::from_disk(n.map(|n| n * back)));
+            let along = [0, 1, 2].map(|a| v[a] + into * n[a]);
+            let speed = along.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let kept = if smooth { 1.0 } else { (1.0 - into / speed.max(into)).max(0.0) };
+            p.v[i] = S::from_disk(along.map(|v| v * kept));
+        }
     }
 
     /// Appends the wall sites within `reach` of owned particles.
