@@ -160,13 +160,7 @@ fn changed_scene(folder: &RunFolder, prepared: String, path: &Path) -> Result<St
     let text = read_scene(path)?;
     let name = path.display().to_string();
     let scene = Scene::read(&name, &text)?;
-    let lock = folder.scene();
-    let then = Scene::read(&lock.display().to_string(), &prepared)?;
-    if let Some((file, _)) = scene.files.iter().find(|file| !then.files.contains(file)) {
-        let message = format!("{file} is not what it was when the run was made; it may not change");
-        return Err(RunError::Input { path: path.into(), message });
-    }
-    if Scene::changes(&name, &prepared, &text)?.is_empty() {
+    if Scene::changes_in(folder, &prepared, path, &name, &text)?.is_empty() {
         return Ok(prepared);
     }
     if let Some(manifest) = checkpoint::newest_manifest(folder)?

@@ -89,7 +89,7 @@ fn a_raster_that_changed_is_refused() {
     fs::write(work.join("ground.asc"), raster.replacen('5', "6", 40)).unwrap();
     let refused = run("sph-run", &[folder.path().as_os_str(), "--scene".as_ref(), longer.as_os_str()], 0);
     assert!(refused.stderr.contains("ground.asc is not what it was when the run was made"), "{refused}");
-    refused.expect(exit::NO_INPUT);
+    refused.expect(exit::USAGE);
     fs::write(work.join("ground.asc"), &raster).unwrap();
     run("sph-run", &[folder.path().as_os_str(), "--scene".as_ref(), longer.as_os_str()], 2).expect(exit::DONE);
     // The copy in the run folder.
