@@ -250,24 +250,24 @@ fn same_grid(table: &Table<'_>, file: &Found<String>, setting: &Setting<'_>) -> 
 
 /// Lower and upper surface of a shape above a place, m; none where it does not stand.
 fn column(shape: &Shape, space: Space, x: f64, y: f64) -> Option<[f64; 2]> {
+    if let Shape::Release(release) = shape {
+        let (ground, depth) = (release.ground.at(x, y), release.thickness(x, y));
+        return (depth > 0.0).then_some([ground, ground + depth]);
+    }
     let (low, high) = bounds(shape, space);
     let inside = |a: usize, v: f64| (low[a]..=high[a]).contains(&v);
     if !inside(0, x) || (space == Space::ThreeD && !inside(1, y)) {
         return None;
     }
     match shape {
-        Shape::Release(release) => {
-            let (ground, depth) = (release.ground.at(x, y), release.thickness(x, y));
-            (depth > 0.0).then_some([ground, ground + depth])
-        }
         Shape::Cylinder { base, radius, .. } => {
             ((x - base[0]).hypot(y - base[1]) < *radius).then_some([low[2], high[2]])
         }
-        Shape::Box { .. } => Some([low[2], high[2]]),
         Shape::Wedge { corner, size, .. } => {
             let part = 1.0 - (x - corner[0]).abs() / size[0];
             (part > 0.0).then_some([low[2], low[2] + part * size[2]])
         }
+        Shape::Box { .. } | Shape::Release(_) => Some([low[2], high[2]]),
     }
 }
 
