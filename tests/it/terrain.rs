@@ -111,7 +111,7 @@ fn a_raster_that_is_not_there_is_one_error_on_any_number_of_ranks() {
     for ranks in [0, 3] {
         let run_folder = work.join("run");
         let refused = run("sph-prep", &[scene.as_os_str(), "-o".as_ref(), run_folder.as_os_str()], ranks);
-        assert!(refused.stderr.contains("scene.toml:11:8: terrain.file: "), "{refused}");
+        assert!(refused.stderr.contains("scene.toml:12:8: terrain.file: "), "{refused}");
         assert_eq!(refused.stderr.matches("ground.asc: No such file").count(), 1, "{refused}");
         assert!(!run_folder.exists());
         refused.expect(exit::USAGE);
