@@ -209,6 +209,7 @@ mod tests {
     fn rows(places: &[[f64; 3]], speed: f64) -> Rows {
         let n = places.len();
         Rows {
+            id: (0..n as u64).collect(),
             position: places.to_vec(),
             velocity: vec![[speed, 0.0, 0.0]; n],
             mass: vec![2000.0; n],
@@ -228,7 +229,8 @@ mod tests {
         let maps = gatherer.finish();
         assert_eq!((maps.first, maps.size), ([0, 0], [6, 5]));
         let sum = |field: &[f64]| field.iter().map(|d| 4.0 * d).sum::<f64>();
-        assert!((sum(&maps.thickness[0]) - 1.0).abs() < 1e-14 && (sum(&maps.thickness[1]) - 3.5).abs() < 1e-14);
+        let sums = [0, 1].map(|k| sum(&maps.thickness[k]));
+        assert!((sums[0] - 1.0).abs() < 1e-14 && (sums[1] - 3.5).abs() < 1e-14, "{sums:?} {:?}", maps.thickness);
         assert!((maps.beyond[1] - 0.125).abs() < 1e-14);
         // x from 8 to 10 of the raster is cell 4; its middle row is 2.
         let cell = 2 * 6 + 4;
