@@ -18,6 +18,7 @@ pub mod laws;
 pub mod lock;
 pub mod outputs;
 pub mod provenance;
+pub mod raster;
 pub mod results;
 pub mod scene;
 pub mod schema;

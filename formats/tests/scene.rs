@@ -173,6 +173,8 @@ fn the_least_scene_gets_all_defaults() {
             shape: Shape::Cylinder { base: [0.0; 3], radius: 0.1, height: 0.1 },
             velocity: [0.0; 3],
         }],
+        terrain: None,
+        files: Vec::new(),
         walls: vec![Wall {
             axis: 2,
             at: 0.0,
@@ -218,6 +220,8 @@ fn every_key_is_read() {
             body("first", Shape::Cylinder { base: [0.0; 3], radius: 0.2, height: 0.2 }, [0.0; 3]),
             body("ramp", Shape::Wedge { corner: [0.5, 0.0, 0.0], size: [0.2, 0.1, 0.05], falls_left: true }, [0.0; 3]),
         ],
+        terrain: None,
+        files: Vec::new(),
         walls: vec![
             Wall { axis: 0, at: 0.5, side: -1.0, slip: Slip::FreeSlip, kind: WallKind::Virtual, velocity: [0.0; 3] },
             Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip, kind: WallKind::Virtual, velocity: [0.0; 3] },

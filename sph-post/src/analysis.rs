@@ -17,6 +17,7 @@ use crate::{
     scatter::Scatter,
     section::{self, Section},
     shear::{Grains, Shear},
+    terrain::{self, Gatherer, Maps},
 };
 use formats::{
     folder::RunFolder,
@@ -113,6 +114,8 @@ pub struct Analysis {
     pub static_speed: f64,
     /// What the run wrote while it went on, if it has begun.
     pub history: Option<History>,
+    /// Maps on the terrain, in three dimensions.
+    pub maps: Option<Maps>,
     /// Where the energy went, if the history tells.
     pub partition: Option<Partition>,
 }
@@ -136,7 +139,7 @@ impl Analysis {
             Err(error) => return Err(FileError::reading(&path, &error).into()),
         };
         let scene = Scene::read(&path.display().to_string(), &text)?;
-        let hash = Scene::hash(&text);
+        let hash = scene.hash_of(&text);
         let index = Index::read(folder)?.unwrap_or_default();
         let files = files(folder, &index, &hash)?;
         let geometry = Geometry::new(&scene);
@@ -146,16 +149,19 @@ impl Analysis {
         let shown = spread(files.len(), PANELS);
         let sections = geometry.time_scale().map_or_else(|| shown.clone(), |scale| at_times(&times, &SHOWN, scale));
         let failure = Some(choices.failure_time.value(&geometry)).filter(|t| t.is_finite()).map(|t| nearest(&times, t));
-        let layers = start(folder, &files)?.map(|start| Layers::new(&geometry, &start, choices.layers));
+        let layers = start(folder, &files)?
+            .map(|start| Layers::new(&geometry, &terrain::places_levelled(&scene, start), choices.layers));
         let grains = Grains::of(&geometry, choices.grain_diameter);
         let colours = &choices.colours[..];
         let mut moments = Vec::with_capacity(files.len());
+        let mut maps = Gatherer::new(&scene);
         for (number, (_, file)) in files.iter().enumerate() {
             let inside = sections.contains(&number);
             let drawn = inside || shown.contains(&number) || failure == Some(number);
             let wanted = Wanted { level, static_speed, layers: layers.as_ref(), inside, drawn, grains, colours };
-            moments.push(moment(&geometry, file, &wanted)?);
+            moments.push(moment(&scene, &geometry, file, &wanted, maps.as_mut())?);
         }
+        let maps = maps.map(Gatherer::finish);
         let history = History::read(folder, &index)?;
         let partition = history.as_ref().and_then(Partition::of);
         Ok(Self {
@@ -174,6 +180,7 @@ impl Analysis {
             layers,
             static_speed,
             history,
+            maps,
             partition,
         })
     }
@@ -215,8 +222,19 @@ struct Wanted<'a> {
     colours: &'a [&'static Field],
 }
 
-fn moment(geometry: &Geometry, file: &Path, wanted: &Wanted) -> Result<Moment, Failure> {
+fn moment(
+    scene: &Scene,
+    geometry: &Geometry,
+    file: &Path,
+    wanted: &Wanted,
+    maps: Option<&mut Gatherer>,
+) -> Result<Moment, Failure> {
     let (header, rows) = snapshot::read(file)?;
+    if let Some(maps) = maps {
+        maps.add(header.time, &rows);
+    }
+    let energy = Energy::new(geometry, &rows);
+    let rows = terrain::levelled(scene, rows);
     let sampler = Sampler::new(geometry, &rows);
     let deposit = Deposit::new(geometry, &rows, &sampler);
     let basal = Basal::new(geometry, &rows, &sampler, &deposit, wanted.level);
@@ -227,7 +245,7 @@ fn moment(geometry: &Geometry, file: &Path, wanted: &Wanted) -> Result<Moment, F
         time: header.time,
         step: header.step,
         particles: rows.len(),
-        energy: Energy::new(geometry, &rows),
+        energy,
         layer_tops: layers.map(|layers| layers.tops(geometry, &rows, &deposit.profile)),
         flow: Flow::new(geometry, &rows, &section, wanted.static_speed),
         failure_plane: FailurePlane::new(geometry, &rows, &deposit, &section, plane),

@@ -32,7 +32,7 @@ impl Energy {
 
     /// What a potential energy of these particles is when it is measured from the floor instead of the origin, J.
     pub fn above_floor(&self, g: &Geometry, potential: f64) -> f64 {
-        potential + self.mass * g.gravity[2] * g.floor
+        potential + self.mass * g.gravity[2] * g.datum
     }
 }
 
@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn potential_energy_above_the_floor_does_not_depend_on_where_the_floor_is() {
         for floor in [0.0, -3.0, 7.0] {
-            let g = Geometry { floor, ..geometry(Space::PlaneStrain, Kernel::CubicSpline, 0.1) };
+            let g = Geometry { floor, datum: floor, ..geometry(Space::PlaneStrain, Kernel::CubicSpline, 0.1) };
             let e = Energy::new(&g, &block(&g, [10, 1, 10]));
             let above = e.above_floor(&g, e.potential);
             assert!((above / (2000.0 * 9.81 * 0.5) - 1.0).abs() < 1e-12, "{floor}: {above}");

@@ -21,8 +21,10 @@ pub struct Geometry {
     pub h: f64,
     /// Gravity, m/s2.
     pub gravity: [f64; 3],
-    /// Height of the floor, m.
+    /// Height of the floor, m; 0 over a terrain, where heights are those above the ground.
     pub floor: f64,
+    /// Height from which potential energies are measured, m.
+    pub datum: f64,
     /// Are x = 0 and y = 0 planes (or, axisymmetric, x = 0 the axis) at which particles are mirrored?
     pub mirrored: [bool; 2],
     /// Where a wall across x bounds the material on its lower and its upper side, m; infinite where none does.
@@ -63,13 +65,13 @@ pub struct Law {
 impl Geometry {
     /// From the scene.
     pub fn new(scene: &Scene) -> Self {
-        let (dx, floor, radial) = (scene.spacing, scene.floor(), scene.is_radial());
+        let (dx, floor, radial) = (scene.spacing, floor(scene), scene.is_radial());
         let mirrored = if scene.space == Space::Axisymmetric { [true, false] } else { scene.symmetry };
         let walls = [(1.0, f64::NEG_INFINITY), (-1.0, f64::INFINITY)]
             .map(|(side, none)| scene.walls.iter().find(|w| w.axis == 0 && w.side == side).map_or(none, |w| w.at));
         let single = if let [body] = &scene.bodies[..] { Some(body) } else { None };
         let extent = single.map(|b| extent(b, scene.space, radial || mirrored[0]));
-        let top = scene.bodies.iter().map(|b| b.shape.bounds(scene.space).1[2]).fold(f64::NEG_INFINITY, f64::max);
+        let top = scene.bodies.iter().map(|b| top(b, scene)).fold(f64::NEG_INFINITY, f64::max);
         let runs_outward = single.zip(extent).is_some_and(|(body, [begin, _])| {
             let left = if radial || mirrored[0] { 0.0 } else { walls[0] };
             (begin - left).abs() <= 0.5 * dx && runs_right(body, radial)
@@ -81,6 +83,7 @@ impl Geometry {
             h: scene.h(),
             gravity: scene.gravity,
             floor,
+            datum: scene.floor(),
             mirrored,
             walls,
             radial,
@@ -173,6 +176,20 @@ impl Geometry {
     }
 }
 
+fn floor(scene: &Scene) -> f64 {
+    if scene.terrain.is_some() { 0.0 } else { scene.floor() }
+}
+
+/// The highest point of a body; over a terrain its height.
+fn top(body: &Body, scene: &Scene) -> f64 {
+    let (low, high) = body.shape.bounds(scene.space);
+    match &body.shape {
+        Shape::Release(release) => release.thickest(),
+        _ if scene.terrain.is_some() => high[2] - low[2],
+        _ => high[2],
+    }
+}
+
 /// Where a body begins and ends along the profile; `cut` at the axis or the plane of symmetry.
 fn extent(body: &Body, space: Space, cut: bool) -> [f64; 2] {
     let (low, high) = body.shape.bounds(space);
@@ -184,6 +201,8 @@ fn extent(body: &Body, space: Space, cut: bool) -> [f64; 2] {
 fn runs_right(body: &Body, radial: bool) -> bool {
     match body.shape {
         Shape::Cylinder { .. } => radial,
+        // Down the slope, wherever that is.
+        Shape::Release(_) => false,
         Shape::Box { .. } => true,
         Shape::Wedge { falls_left, .. } => !falls_left,
     }

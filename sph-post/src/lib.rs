@@ -2,7 +2,8 @@
 //!
 //! Serial: one snapshot is in memory at a time, and of several ranks one works. [`geometry`] says what the scene means for the evaluation,
 //! [`sample`] gives fields at any point, [`deposit`], [`basal`], [`dip`], [`energy`], [`layers`], [`section`], [`flow`], [`shear`] and
-//! [`failure_plane`] evaluate one snapshot, [`analysis`] goes through the run, [`partition`] through its history, [`netcdf`], [`plot`], [`page`] and [`report`] show what it found.
+//! [`failure_plane`] evaluate one snapshot, [`analysis`] goes through the run, [`partition`] through its history, [`terrain`] maps what
+//! happened on a terrain, [`netcdf`], [`plot`], [`page`] and [`report`] show what it found.
 
 pub mod analysis;
 pub mod basal;
@@ -28,6 +29,7 @@ pub mod scatter;
 pub mod section;
 pub mod shear;
 pub mod summary;
+pub mod terrain;
 #[cfg(test)]
 mod testing;
 
@@ -114,6 +116,11 @@ fn evaluate(arguments: &Arguments) -> Result<Vec<PathBuf>, Failure> {
     std::fs::create_dir_all(&post).map_err(|error| FileError::writing(&post, 0, &error))?;
     let mut paths = vec![post.join("results.nc")];
     netcdf::results(&analysis).write(&paths[0])?;
+    if let Some(maps) = netcdf::terrain(&analysis) {
+        let path = post.join("terrain.nc");
+        maps.write(&path)?;
+        paths.push(path);
+    }
     if let Some(history) = &analysis.history {
         let path = post.join("history.nc");
         netcdf::history(&analysis, history).write(&path)?;

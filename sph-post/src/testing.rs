@@ -19,6 +19,7 @@ pub fn geometry(space: Space, kernel: Kernel, dx: f64) -> Geometry {
         h,
         gravity: [0.0, 0.0, -9.81],
         floor: 0.0,
+        datum: 0.0,
         mirrored: [true, space == Space::ThreeD],
         walls: [f64::NEG_INFINITY, f64::INFINITY],
         radial: space == Space::Axisymmetric,

@@ -22,6 +22,7 @@ pub fn steady_h_over_dx(kernel: Kernel) -> f64 {
 /// All warnings of a scene, one a line.
 pub fn warnings(scene: &Scene, lattices: &[Lattice], bodies: &[Body]) -> String {
     let mut all: Vec<String> = bodies.iter().filter_map(coarse).collect();
+    all.extend(thin(scene, lattices));
     all.extend(wide_kernel(scene));
     all.extend(beyond_yield(scene, lattices));
     all.extend(undamped_rings(scene));
@@ -35,9 +36,22 @@ fn coarse(body: &Body) -> Option<String> {
         .then(|| format!("body {name}: the volume of its particles is off by {deviation:+.1} %; {advice}"))
 }
 
+fn thin(scene: &Scene, lattices: &[Lattice]) -> Vec<String> {
+    let bodies = lattices.iter().zip(&scene.bodies);
+    let off = bodies.map(|(lattice, body)| (&body.name, 100.0 * (lattice.scale - 1.0)));
+    let words = |(name, off): (&String, f64)| {
+        let message = format!("body {name}: where it is thinner than half a spacing it has no particles");
+        format!(
+            "{message}; what lies there, and rounding, raises all thicknesses by {off:+.1} %; choose a finer spacing"
+        )
+    };
+    off.filter(|(_, off)| off.abs() > TOLERATED_DEVIATION).map(words).collect()
+}
+
 fn wide_kernel(scene: &Scene) -> Option<String> {
     let (ratio, limit, name) = (scene.h_over_dx, steady_h_over_dx(scene.kernel), scene.kernel.name());
-    let sticks = scene.walls.iter().any(|wall| wall.slip == Slip::NoSlip);
+    let sticks = scene.walls.iter().any(|wall| wall.slip == Slip::NoSlip)
+        || scene.terrain.as_ref().is_some_and(|terrain| terrain.slip == Slip::NoSlip);
     (sticks && ratio > limit).then(|| {
         format!(
             "kernel.h-over-dx = {ratio}: above {limit} the kernel {name} is unstable at no-slip walls (kinetic energy \

@@ -83,8 +83,15 @@ impl Plan {
                     for id in wanted {
                         let placed = [column.x, column.y, lattice.z(column, id - numbers.start)];
                         let mut position = jitter.displace(id, placed);
+                        if let Some(ground) = lattice.solid.ground() {
+                            // The lattice leans with the ground, and so do its displacements.
+                            position[2] += ground.at(position[0], position[1]) - ground.at(column.x, column.y);
+                        }
                         // What jitter does to rings leaves them their mass; relaxed, they have the same section again.
                         let mut place = [column.x, column.y];
+                        if lattice.solid.ground().is_some() {
+                            place = [position[0], position[1]];
+                        }
                         if let Some(all) = &relaxed {
                             position = all[(id - self.first[body * self.shares as usize]) as usize];
                             place = [position[0], position[1]];
@@ -95,7 +102,9 @@ impl Plan {
                         rows.body.push(body as u64);
                         rows.position.push(position);
                         rows.velocity.push(scene.bodies[body].velocity);
-                        rows.mass.push(density * lattice.volume(place[0]));
+                        let volume =
+                            if relaxed.is_some() { lattice.volume(place[0]) } else { lattice.bulk_volume(&column) };
+                        rows.mass.push(density * volume);
                         rows.density.push(density);
                         rows.stress.push(stress);
                         rows.stress_work.push(0.0);
@@ -112,7 +121,7 @@ impl Plan {
     pub fn volume(&self, body: usize, rank: u64) -> f64 {
         let lattice = &self.lattices[body];
         let columns = share(lattice.columns(), rank, self.shares).map(|c| lattice.column(c));
-        columns.map(|c| c.cells as f64 * lattice.volume(c.x)).sum()
+        columns.map(|c| c.cells as f64 * lattice.bulk_volume(&c)).sum()
     }
 }
 
@@ -161,7 +170,11 @@ impl Jitter {
     fn new(scene: &Scene, lattice: &Lattice) -> Self {
         // Planes closer than a spacing have their first particles closer to the faces: none may leave the body.
         let most = |axis: usize| scene.spacing.min(2.0 * lattice.margin(axis));
-        let amplitude = [0, 1, 2].map(|axis| scene.initial.jitter * most(axis));
+        let mut amplitude = [0, 1, 2].map(|axis| scene.initial.jitter * most(axis));
+        if lattice.solid.ground().is_some() {
+            // Layers may be nearer to each other than a spacing, and to the ground.
+            amplitude[2] *= 2.0 / 3.0;
+        }
         Self { axes: scene.space.axes(), amplitude, key: splitmix64(scene.initial.seed) }
     }
 

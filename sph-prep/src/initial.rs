@@ -1,7 +1,7 @@
 //! Stress of the particles at the start.
 
 use crate::lattice::Lattice;
-use formats::scene::{InitialStress, Scene};
+use formats::scene::{InitialStress, Scene, normal};
 
 /// The rule for the stress at the start.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +31,8 @@ impl Stress {
 
     /// Stress at the height `z` of the column at (x, y), Pa, tension positive, in the order XX YY ZZ XY YZ XZ. The
     /// vertical stress carries all that lies straight above, of whatever body; `sideways` times that acts along x and
-    /// y, which are the radial and the hoop direction in the axisymmetric space.
+    /// y, which are the radial and the hoop direction in the axisymmetric space. On a terrain the part of the weight
+    /// that acts across the ground counts, and `sideways` times that acts along the ground.
     pub fn at(&self, lattices: &[Lattice], [x, y]: [f64; 2], z: f64) -> [f64; 6] {
         let Some(sideways) = self.sideways else {
             let p = -self.pressure + 0.0;
@@ -41,7 +42,18 @@ impl Stress {
         // Disorder may lift a particle of the top layer above the surface: nothing weighs on it.
         let depth: f64 = lattices.iter().filter_map(|lattice| lattice.solid.vertical_extent(x, y)).map(above).sum();
         let vertical = -self.weight * depth;
-        [sideways * vertical, sideways * vertical, vertical, 0.0, 0.0, 0.0]
+        let ground = lattices.iter().find_map(|lattice| {
+            lattice.solid.vertical_extent(x, y)?;
+            Some(normal(lattice.solid.ground()?, lattice.solid.space, x, y))
+        });
+        let Some(n) = ground else { return [sideways * vertical, sideways * vertical, vertical, 0.0, 0.0, 0.0] };
+        // A layer of depth d along z lies d n_z deep across the ground, and of its weight the part n_z acts across.
+        let across = vertical * n[2] * n[2];
+        let part = |a: usize, b: usize| {
+            let along = if a == b { sideways } else { 0.0 };
+            across * (along + (1.0 - sideways) * n[a] * n[b])
+        };
+        [part(0, 0), part(1, 1), part(2, 2), part(0, 1), part(1, 2), part(0, 2)]
     }
 
     /// The stress at the foot of the column that carries most, of some thousand columns of each body.

@@ -5,7 +5,7 @@
 
 use crate::{packing::Packing, shape::Solid};
 use formats::{
-    scene::{Scene, Shape},
+    scene::{Release, Scene, Shape, WallLattice},
     space::Space,
 };
 use std::f64::consts::PI;
@@ -29,8 +29,10 @@ pub struct Lattice {
     columns: [u64; 2],
     /// Number of layers, where the body is highest.
     layers: u64,
-    /// Volume of a particle, m3; its section in the plane spaces, m2.
+    /// Volume of a particle, m3; its section in the plane spaces, m2. Of released material that of a whole cell.
     share: f64,
+    /// What the thickness of released material is multiplied with, so that its volume is exact: see [`Lattice::released`].
+    pub scale: f64,
 }
 
 /// A column of particles.
@@ -44,12 +46,21 @@ pub struct Column {
     pub cells: u64,
     /// The lowest layer that it has a particle in.
     lowest: u64,
+    /// Where layers are counted from, m above z = 0, and how far they are apart, m.
+    foot: f64,
+    pitch: f64,
+    /// Volume of its particles over that of others.
+    bulk: f64,
 }
 
 impl Lattice {
     /// The lattice of body number `body` of a scene.
     pub fn new(scene: &Scene, body: usize) -> Self {
         let (solid, packing) = (Solid::new(scene, body), Packing::new(scene));
+        if let Shape::Release(release) = &solid.shape {
+            let release = release.clone();
+            return Self::released(scene, solid, packing, &release);
+        }
         if packing.staggered { Self::fitted(scene, solid, packing) } else { Self::cubic(scene, solid, packing) }
     }
 
@@ -63,6 +74,8 @@ impl Lattice {
                 if space == Space::Axisymmetric { ([0, 0], [n as u64, 1]) } else { ([-n, -n], [2 * n as u64; 2]) }
             }
             Shape::Box { min, max } => ([0, 0], [cells(max[0] - min[0]), cells(max[1] - min[1])]),
+            // [`Lattice::released`]
+            Shape::Release(_) => ([0, 0], [1, 1]),
             Shape::Wedge { size, falls_left, .. } => {
                 let n = cells(size[0]);
                 ([if falls_left { -(n as i64) } else { 0 }, 0], [n, cells(size[1])])
@@ -73,7 +86,30 @@ impl Lattice {
         }
         let (origin, layers) = (solid.anchor(), cells(solid.height()));
         let share = dx.powi(space.dimension() as i32);
-        Self { solid, spacing: dx, packing, origin, first, columns, layers, share }
+        Self { solid, spacing: dx, packing, origin, first, columns, layers, share, scale: 1.0 }
+    }
+
+    /// Columns of released material: those that wall sites lie below (see [`WallLattice`]), filled upwards from the ground. A
+    /// column of thickness t has t/dx particles, rounded, of the volume dx^2 t/n: it is as thick as it should be. What lies
+    /// where the thickness is less than dx/2 is spread over the rest, by a factor on all thicknesses, so that
+    /// the volume is that of the shape.
+    fn released(scene: &Scene, solid: Solid, packing: Packing, release: &Release) -> Self {
+        let (dx, (low, high)) = (scene.spacing, solid.bounds());
+        let origin = WallLattice::new(scene).origin();
+        let range = |axis: usize| {
+            let first = ((low[axis] - origin[axis]) / dx).floor();
+            (first as i64, (((high[axis] - origin[axis]) / dx).ceil() - first).max(1.0) as u64)
+        };
+        let [(first_x, nx), (first_y, ny)] = [range(0), if scene.space == Space::ThreeD { range(1) } else { (0, 1) }];
+        let share = dx.powi(scene.space.dimension() as i32);
+        let (first, columns, layers) = ([first_x, first_y], [nx, ny], (solid.height() / dx).ceil().max(1.0) as u64);
+        let mut lattice = Self { solid, spacing: dx, packing, origin, first, columns, layers, share, scale: 1.0 };
+        let kept = (0..lattice.columns()).map(|c| lattice.column(c)).filter(|c| c.cells > 0);
+        let kept: f64 = kept.map(|c| c.cells as f64 * lattice.bulk_volume(&c)).sum();
+        if kept > 0.0 {
+            lattice.scale = release.volume(scene.space, scene.symmetry, dx) / kept;
+        }
+        lattice
     }
 
     /// Planes at nearly their ideal distances, a whole number of them between opposite faces and half a distance from
@@ -112,7 +148,7 @@ impl Lattice {
         let is_cuboid = !upright && !matches!(solid.shape, Shape::Wedge { .. });
         // Of an odd number of crossings more than half are even.
         let share = if is_cuboid { cell * crossings / (0.5 * crossings).ceil() } else { 2.0 * cell };
-        Self { solid, spacing: scene.spacing, packing, origin, first, columns, layers, share }
+        Self { solid, spacing: scene.spacing, packing, origin, first, columns, layers, share, scale: 1.0 }
     }
 
     /// Number of columns, empty ones included.
@@ -132,9 +168,17 @@ impl Lattice {
         let x = self.origin[0] + u * pitch[0];
         let y = if three { self.origin[1] + v * pitch[1] } else { 0.0 };
         let lowest = self.packing.lowest([i, j]);
+        let plain = Column { x, y, cells: 0, lowest, foot: self.origin[2], pitch: pitch[2], bulk: 1.0 };
         let mirrored = |side: bool, x: f64| side && x <= ON_THE_BORDER * self.spacing;
         if mirrored(self.solid.symmetry[0], x) || (three && mirrored(self.solid.symmetry[1], y)) {
-            return Column { x, y, cells: 0, lowest };
+            return plain;
+        }
+        if let Shape::Release(release) = &self.solid.shape {
+            let spacings = release.thickness(x, y) / self.spacing;
+            let cells = spacings.round();
+            let bulk = if cells > 0.0 { spacings / cells * self.scale } else { 1.0 };
+            let (foot, pitch) = (release.ground.at(x, y), bulk * self.spacing);
+            return Column { cells: cells as u64, foot, pitch, bulk, ..plain };
         }
         let anchor = self.solid.anchor();
         let offset = |axis: usize| self.origin[axis] - anchor[axis];
@@ -145,18 +189,18 @@ impl Lattice {
                 let inside = distance < radius / self.spacing - ON_THE_BORDER;
                 if inside { self.layers as f64 } else { 0.0 }
             }
-            Shape::Box { .. } => self.layers as f64,
+            Shape::Box { .. } | Shape::Release(_) => self.layers as f64,
             Shape::Wedge { size, .. } => size[2] / pitch[2] * (1.0 - (u * pitch[0] + offset(0)).abs() / size[0]),
         };
         // Layers whose middle lies below the surface.
         let cells = ((top - 0.5 - lowest as f64 - ON_THE_BORDER) / self.packing.step() as f64).ceil().max(0.0) as u64;
-        Column { x, y, cells, lowest }
+        Column { cells, ..plain }
     }
 
     /// The place of a particle of a column, m above z = 0.
     pub fn z(&self, column: Column, cell: u64) -> f64 {
         let layer = column.lowest + cell * self.packing.step();
-        self.origin[2] + (layer as f64 + 0.5) * self.packing.pitch[2]
+        column.foot + (layer as f64 + 0.5) * column.pitch
     }
 
     /// The period along an axis, where the body fills it: lower and upper end, m.
@@ -181,6 +225,11 @@ impl Lattice {
             Space::Axisymmetric => (self.columns() * self.layers).div_ceil(self.packing.step()),
             _ => (self.solid.ideal_volume() / self.share).round() as u64,
         }
+    }
+
+    /// Volume of a particle of a column; units as [`Lattice::volume`].
+    pub fn bulk_volume(&self, column: &Column) -> f64 {
+        column.bulk * self.volume(column.x)
     }
 
     /// Volume of a particle at this distance from the axis: m3, m2 in plane strain (per metre of depth), of the whole

@@ -29,7 +29,7 @@ use formats::{
     about::{self, Asked},
     exit,
     provenance::{self, Entry},
-    scene::{Fault, Scene, SceneError},
+    scene::{Fault, Scene, SceneError, Sources},
     schema::Kept,
     snapshot::{self, Header, Rows},
 };
@@ -133,7 +133,16 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
         }
     };
     *text = text::share(&arguments.scene, comm)?;
-    let scene = Scene::read(&arguments.scene.display().to_string(), text)?;
+    let name = arguments.scene.display().to_string();
+    // Files that the scene names are read by rank 0 alone, as it asks for them.
+    let mut sources = Sources::of(&arguments.scene);
+    let mut read = talks.then(|| Scene::read_with(&name, text, &sources));
+    let bytes = text::broadcast(if talks { sources.to_bytes() } else { Vec::new() }, comm);
+    if !talks {
+        sources = Sources::from_bytes(&bytes);
+        read = Some(Scene::read_with(&name, text, &sources));
+    }
+    let Some(scene) = read.transpose()? else { return Err(Failure::Elsewhere(PANIC)) };
 
     let staging = if talks { Staging::new(&arguments.output).map(Some) } else { Ok(None) };
     let staging = agree(comm, staging)?;
@@ -159,7 +168,7 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
         text::say(&advice::warnings(&scene, &plan.lattices, &bodies));
     }
     let rows = plan.particles(&scene, snapshot::share(plan.total(), comm.rank() as u64, ranks));
-    write(&scene, text, &rows, plan.total(), staging, comm)
+    write(&scene, text, &sources, &rows, plan.total(), staging, comm)
 }
 
 fn bodies(scene: &Scene, plan: &Plan, comm: &SimpleCommunicator) -> Vec<summary::Body> {
@@ -184,6 +193,7 @@ fn no_particles(arguments: &Arguments, text: &str, body: &str) -> SceneError {
 fn write(
     scene: &Scene,
     text: &str,
+    sources: &Sources,
     rows: &Rows,
     count: u64,
     staging: Option<Staging>,
@@ -193,7 +203,7 @@ fn write(
     let path = PathBuf::from(OsString::from_vec(text::broadcast(path, comm)));
     let header = Header {
         title: scene.title.clone(),
-        scene_hash: Scene::hash(text),
+        scene_hash: scene.hash_of(text),
         space: scene.space,
         kernel: scene.kernel,
         spacing: scene.spacing,
@@ -208,6 +218,7 @@ fn write(
     let finished = staging.map_or(Ok(()), |staging| {
         let folder = staging.folder().clone();
         staging.write(&folder.scene(), text.as_bytes())?;
+        sources.write(folder.path()).map_err(|error| Failure::output(folder.path(), &error))?;
         provenance::append(&folder.provenance(), Entry::this("sph-prep", comm.size() as usize))?;
         staging.publish()
     });

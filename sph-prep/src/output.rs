@@ -5,7 +5,7 @@
 //! point or lie where its owner can't make others, so then the staging folder lies within, and its files move up.
 
 use crate::failure::Failure;
-use formats::{disk, folder::RunFolder};
+use formats::{disk, folder::RunFolder, scene::Sources};
 use std::{
     fs, io,
     path::{Path, PathBuf},
@@ -96,6 +96,10 @@ impl Staging {
     /// Moves the files up into the folder around; takes them back where one can't be moved.
     fn move_up(&self) -> io::Result<()> {
         let mut moved: Vec<PathBuf> = Vec::new();
+        let copies = [self.folder.path(), self.target.as_path()].map(Sources::folder);
+        if copies[0].exists() {
+            fs::rename(&copies[0], &copies[1])?;
+        }
         // The particles first: once the scene is there, so is all it needs.
         let files = [self.folder.initial(), self.folder.provenance(), self.folder.scene()];
         for from in files {

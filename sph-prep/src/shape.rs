@@ -1,6 +1,7 @@
 //! The shape of a body in its space: borders, surface, volume.
 
 use formats::{
+    raster::Grid,
     scene::{Scene, Shape},
     space::Space,
 };
@@ -15,12 +16,15 @@ pub struct Solid {
     pub space: Space,
     /// Is only the positive side of x = 0, y = 0 filled?
     pub symmetry: [bool; 2],
+    /// Lattice spacing, m.
+    pub spacing: f64,
 }
 
 impl Solid {
     /// Body number `body` of a scene.
     pub fn new(scene: &Scene, body: usize) -> Self {
-        Self { shape: scene.bodies[body].shape.clone(), space: scene.space, symmetry: scene.symmetry }
+        let shape = scene.bodies[body].shape.clone();
+        Self { shape, space: scene.space, symmetry: scene.symmetry, spacing: scene.spacing }
     }
 
     /// A point of the foot, m, that the shape is described from: the centre of a cylinder, the corner of the others.
@@ -30,6 +34,7 @@ impl Solid {
             Shape::Cylinder { base, .. } => base,
             Shape::Box { min, .. } => min,
             Shape::Wedge { corner, .. } => corner,
+            Shape::Release(ref release) => release.bounds(self.space).0,
         }
     }
 
@@ -47,9 +52,14 @@ impl Solid {
     pub fn vertical_extent(&self, x: f64, y: f64) -> Option<(f64, f64)> {
         let three = self.space == Space::ThreeD;
         let across = |low: f64, high: f64| !three || (low..high).contains(&y);
+        if let Shape::Release(release) = &self.shape {
+            let (ground, depth) = (release.ground.at(x, y), release.thickness(x, y));
+            return (depth > 0.0).then_some((ground, ground + depth));
+        }
         let stands = match self.shape {
             Shape::Cylinder { base, radius, .. } if three => (x - base[0]).hypot(y - base[1]) < radius,
             Shape::Cylinder { radius, .. } => x < radius,
+            Shape::Release(_) => false,
             Shape::Box { min, max } => (min[0]..max[0]).contains(&x) && across(min[1], max[1]),
             Shape::Wedge { corner, size, falls_left } => {
                 let along = if falls_left { corner[0] - x } else { x - corner[0] };
@@ -66,6 +76,7 @@ impl Solid {
                 ([x - radius, y - radius, z], [x + radius, y + radius, z + height])
             }
             Shape::Box { min, max } => (min, max),
+            Shape::Release(ref release) => release.bounds(self.space),
             Shape::Wedge { corner: [x, y, z], size, falls_left } => {
                 let start = if falls_left { x - size[0] } else { x };
                 ([start, y, z], [start + size[0], y + size[1], z + size[2]])
@@ -79,6 +90,14 @@ impl Solid {
             }
         }
         (low, high)
+    }
+
+    /// The ground, of what lies on a terrain.
+    pub fn ground(&self) -> Option<&Grid> {
+        match &self.shape {
+            Shape::Release(release) => Some(&release.ground),
+            _ => None,
+        }
     }
 
     /// Faces, planes of symmetry and the axis included: those across x (the round face too), across y, across z (the
@@ -155,6 +174,7 @@ impl Solid {
                 };
                 area * (max[2] - min[2])
             }
+            Shape::Release(ref release) => release.volume(self.space, self.symmetry, self.spacing),
             Shape::Wedge { corner, size, falls_left } => {
                 let far = if falls_left { corner[0] - size[0] } else { corner[0] + size[0] };
                 let (low, high) = clip(0, corner[0].min(far), corner[0].max(far));
@@ -168,6 +188,10 @@ impl Solid {
     pub fn height(&self) -> f64 {
         match self.shape {
             Shape::Cylinder { height, .. } => height,
+            Shape::Release(_) => {
+                let (low, high) = self.bounds();
+                high[2] - low[2]
+            }
             Shape::Box { min, max } => max[2] - min[2],
             Shape::Wedge { size, .. } => size[2],
         }

@@ -2,7 +2,7 @@
 
 use crate::lattice::Lattice;
 use formats::{
-    scene::{Scene, Shape},
+    scene::{Scene, Shape, WallLattice},
     space::Space,
 };
 use std::f64::consts::FRAC_PI_4;
@@ -36,6 +36,16 @@ pub fn within_reach(scene: &Scene, lattices: &[Lattice]) -> u64 {
             }
         }
     }
+    if scene.terrain.is_some() {
+        let walls = WallLattice::new(scene);
+        for lattice in lattices {
+            for column in (0..lattice.columns()).map(|c| lattice.column(c)).filter(|c| c.cells > 0) {
+                let foot = [column.x, column.y, lattice.z(column, 0)];
+                let gap = walls.ground(foot).map_or(f64::INFINITY, |ground| foot[2] - ground);
+                sites += ((reach - gap) / dx + 0.5).floor().max(0.0);
+            }
+        }
+    }
     sites.round() as u64
 }
 
@@ -43,7 +53,7 @@ pub fn within_reach(scene: &Scene, lattices: &[Lattice]) -> u64 {
 mod tests {
     use super::*;
     use crate::{fill, testing::scene};
-    use formats::scene::{Slip, Wall, WallKind, WallLattice};
+    use formats::scene::{Slip, Wall, WallKind};
     use std::collections::HashSet;
 
     fn floor() -> Wall {

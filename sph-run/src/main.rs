@@ -3,7 +3,7 @@
 use formats::about::{self, Asked};
 use formats::folder::RunFolder;
 use formats::h5::Communicator;
-use formats::scene::Scene;
+use formats::scene::{Scene, Sources};
 use formats::{exit, lock};
 use mpi::traits::Communicator as _;
 use sph_run::cli::{self, Cli, Wanted};
@@ -12,7 +12,7 @@ use sph_run::error::RunError;
 use sph_run::huge_pages::HugePages;
 use sph_run::lanes::Instructions;
 use sph_run::limits::Limits;
-use sph_run::parallel::agree::{agree, share_text};
+use sph_run::parallel::agree::{agree, share_bytes, share_text};
 use sph_run::resume::{Past, Start, read_scene};
 use sph_run::run::{Outcome, Run};
 use sph_run::{check, dispatch, parallel, scheduler};
@@ -124,6 +124,21 @@ fn instructions(comm: &Communicator, wanted: Wanted) -> Result<Instructions, Run
     }
 }
 
+/// The scene, and the files that it names, which rank 0 alone reads. Collective.
+fn share_scene(comm: &Communicator, folder: &RunFolder, text: &str) -> Result<Scene, RunError> {
+    let (path, root) = (folder.scene(), comm.rank() == 0);
+    let mut sources = Sources::of(&path);
+    if root {
+        // Its faults are those of all ranks.
+        let _ = Scene::read_with(&path.display().to_string(), text, &sources);
+    }
+    let bytes = share_bytes(comm, || Ok(sources.to_bytes()))?;
+    if !root {
+        sources = Sources::from_bytes(&bytes);
+    }
+    Ok(Scene::read_with(&path.display().to_string(), text, &sources)?)
+}
+
 fn run(
     comm: &Communicator,
     cli: &Cli,
@@ -157,8 +172,8 @@ fn run(
     let Some(start) = start else {
         return Err(RunError::Input { path: folder.checkpoints(), message: "its manifest can't be understood".into() });
     };
-    let scene = Scene::read(&folder.scene().display().to_string(), &start.scene)?;
-    let scene_hash = Scene::hash(&start.scene);
+    let scene = share_scene(comm, folder, &start.scene)?;
+    let scene_hash = scene.hash_of(&start.scene);
     let lock = lock.as_ref();
     let run = Run { comm, cli, folder, scene: &scene, scene_hash, start, past, limits, instructions, deadline, lock };
     let outcome = dispatch::resolve(&scene, run);

@@ -160,7 +160,7 @@ fn changed_scene(folder: &RunFolder, prepared: String, path: &Path) -> Result<St
     let text = read_scene(path)?;
     let name = path.display().to_string();
     let scene = Scene::read(&name, &text)?;
-    if Scene::changes(&name, &prepared, &text)?.is_empty() {
+    if Scene::changes_in(folder, &prepared, path, &name, &text)?.is_empty() {
         return Ok(prepared);
     }
     if let Some(manifest) = checkpoint::newest_manifest(folder)?

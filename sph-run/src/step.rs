@@ -91,6 +91,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             p.x[i] = p.x[i] + self.periods.rounded(p.v[i] * dt);
         }
         self.mirrors.keep_inside(p);
+        self.walls.keep_above::<D, N, P::Space>(p, &self.periods, dt);
     }
 
     /// Lays out the owned particles and strains the first `ahead` of them. Returns how many are laid out.

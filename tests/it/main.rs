@@ -5,5 +5,6 @@ mod bad_input;
 mod bench;
 mod pages;
 mod same_bits;
+mod terrain;
 mod tidy;
 mod tools;

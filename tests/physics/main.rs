@@ -10,6 +10,7 @@ mod precision;
 mod rest;
 mod slopes;
 mod stepping;
+mod terrain;
 mod walls;
 
 use formats::folder::RunFolder;

@@ -3,6 +3,7 @@
 
 pub mod damage;
 pub mod python;
+pub mod rasters;
 pub mod shim;
 pub mod trial;
 

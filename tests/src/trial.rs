@@ -142,6 +142,13 @@ impl Trial {
         for file in [RunFolder::scene, RunFolder::initial, RunFolder::provenance] {
             fs::copy(file(&self.reference), file(&folder)).unwrap();
         }
+        let [from, to] = [self.reference.path(), folder.path()].map(formats::scene::Sources::folder);
+        if from.exists() {
+            fs::create_dir(&to).unwrap();
+            for entry in fs::read_dir(from).unwrap().flatten() {
+                fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
+            }
+        }
         folder
     }
 

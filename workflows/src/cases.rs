@@ -71,7 +71,7 @@ mod tests {
             let case = find(&name).unwrap();
             assert_ne!(case.title, name, "{name}: no title");
             let text = std::fs::read_to_string(&case.scene).unwrap();
-            if let Err(faults) = formats::scene::Scene::read(&name, &text) {
+            if let Err(faults) = formats::scene::Scene::read(&case.scene.display().to_string(), &text) {
                 panic!("{faults}");
             }
             let readme = std::fs::read_to_string(case.scene.with_file_name("README.md")).unwrap();

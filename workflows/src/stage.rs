@@ -5,7 +5,7 @@ use crate::{failure::Failure, paths};
 use formats::{
     exit,
     folder::RunFolder,
-    scene::{Change, Scene},
+    scene::{Change, Scene, SceneError},
     snapshot,
 };
 use std::path::{Path, PathBuf};
@@ -209,8 +209,9 @@ fn changes(folder: &RunFolder, job: &Job) -> Result<Vec<Change>, Failure> {
     let (then, now) = (std::fs::read_to_string(folder.scene()), std::fs::read_to_string(job.scene));
     let reason = match (then, now) {
         (Ok(_), Ok(_)) if !folder.initial().is_file() => "holds a preparation that did not finish".to_owned(),
-        (Ok(then), Ok(now)) if then == now => return Ok(Vec::new()),
-        (Ok(then), Ok(now)) => match Scene::changes(&paths::short(job.scene).display().to_string(), &then, &now) {
+        // Where a raster is named, it may have changed under its name.
+        (Ok(then), Ok(now)) if then == now && !now.contains("terrain") => return Ok(Vec::new()),
+        (Ok(then), Ok(now)) => match compared(folder, job, &then, &now) {
             Ok(changes) => return Ok(changes),
             Err(error) => format!("cannot go on with the scene as it is now:\n{error}\n"),
         },
@@ -223,6 +224,10 @@ fn changes(folder: &RunFolder, job: &Job) -> Result<Vec<Change>, Failure> {
     };
     let link = if reason.ends_with('\n') { "" } else { "; " };
     Err(Failure::cannot_write(format!("{name} {reason}{link}{advice}")))
+}
+
+fn compared(folder: &RunFolder, job: &Job, then: &str, now: &str) -> Result<Vec<Change>, SceneError> {
+    Scene::changes_in(folder, then, job.scene, &paths::short(job.scene).display().to_string(), now)
 }
 
 /// Removes an earlier run, and nothing that doesn't look like one.

@@ -4,9 +4,9 @@
 //! not count; the order of bodies and walls does, because particles and wall sites are numbered by it. Defaults are not filled
 //! in: a later version may have keys that this one does not know, and must still find the same hash.
 
-use super::{Output, Scene, SceneError, raw::Faults};
-use crate::{provenance, units};
-use std::{collections::BTreeMap, fmt, ops::Range};
+use super::{Output, Scene, SceneError, Sources, raw::Faults};
+use crate::{folder::RunFolder, provenance, units};
+use std::{collections::BTreeMap, fmt, ops::Range, path::Path};
 use toml::de::{DeTable, DeValue};
 
 /// Keys that may change while a run goes on: a title for people, when the run is over, and what is written meanwhile. On none
@@ -44,6 +44,37 @@ impl Scene {
     /// All faults of the new scene; or else all keys that may not change and did, in the order of the file.
     pub fn changes(name: &str, old: &str, new: &str) -> Result<Vec<Change>, SceneError> {
         Self::read(name, new)?;
+        Self::differences(name, old, new)
+    }
+
+    /// The same between the scene of a run folder and one at `path` that is to replace it; the files that both name may not have
+    /// changed either. `name` is used in messages.
+    ///
+    /// # Errors
+    /// As [`Scene::changes`].
+    pub fn changes_in(
+        run: &RunFolder,
+        old: &str,
+        path: &Path,
+        name: &str,
+        new: &str,
+    ) -> Result<Vec<Change>, SceneError> {
+        let now = Self::read_with(name, new, &Sources::of(path))?;
+        if !now.files.is_empty() {
+            let lock = run.scene();
+            let then = Self::read_with(&lock.display().to_string(), old, &Sources::of(&lock))?;
+            let differs = |file: &&(String, String)| then.files.iter().any(|old| old.0 == file.0 && old.1 != file.1);
+            if let Some((file, _)) = now.files.iter().find(differs) {
+                let faults = Faults::new(new);
+                let message = format!("{file} is not what it was when the run was made; it may not change");
+                faults.add(new.find(file.as_str()).unwrap_or(0), "", message);
+                return Err(SceneError { file: name.to_string(), faults: faults.into_list() });
+            }
+        }
+        Self::differences(name, old, new)
+    }
+
+    fn differences(name: &str, old: &str, new: &str) -> Result<Vec<Change>, SceneError> {
         let (then, now) = (Values::of(old), Values::of(new));
         let mut changes = Vec::new();
         let faults = Faults::new(new);

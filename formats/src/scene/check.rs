@@ -2,8 +2,10 @@
 //! What concerns places (bodies, walls, planes of symmetry) is in [`super::geometry`].
 
 use super::{
-    End, Output, Scene, SceneError, geometry, held, initial, material, numerics, period,
+    End, Output, Scene, SceneError, Shape, geometry, held, initial, material, numerics, period,
     raw::{Allowed, Faults, POSITIVE, Table, values},
+    sources::Sources,
+    terrain::{self, Terrain},
 };
 use crate::{kernel::Kernel, space::Space, units::Dimension};
 use toml::de::DeTable;
@@ -16,7 +18,7 @@ const AT_REST: Allowed =
 const STANDARD_GRAVITY: f64 = 9.81;
 
 /// What all sections lie in; None where the scene has a fault there.
-pub(super) struct Setting {
+pub(super) struct Setting<'a> {
     pub space: Option<Space>,
     pub spacing: Option<f64>,
     /// Smoothing length over spacing.
@@ -24,16 +26,20 @@ pub(super) struct Setting {
     pub gravity: Option<[f64; 3]>,
     pub symmetry: [bool; 2],
     pub periodic: [Option<[f64; 2]>; 3],
+    /// Does the scene have one, be it with faults?
+    pub has_terrain: bool,
+    pub terrain: Option<Terrain>,
+    pub sources: &'a Sources,
 }
 
 /// Checks the text of a scene file. All faults are reported at once, in the order of the file.
-pub(super) fn scene(name: &str, text: &str) -> Result<Scene, SceneError> {
+pub(super) fn scene(name: &str, text: &str, sources: &Sources) -> Result<Scene, SceneError> {
     let faults = Faults::new(text);
     let (document, syntax_errors) = DeTable::parse_recoverable(text);
     for error in &syntax_errors {
         faults.syntax(error);
     }
-    let scene = read(Table::root(document.get_ref(), &faults));
+    let scene = read(Table::root(document.get_ref(), &faults), sources);
     if scene.is_none() && faults.is_empty() {
         faults.add(0, "", "cannot be understood as a scene");
     }
@@ -44,13 +50,16 @@ pub(super) fn scene(name: &str, text: &str) -> Result<Scene, SceneError> {
 }
 
 /// Reads every section before it gives up on any, so that no fault hides another.
-fn read(root: Table<'_>) -> Option<Scene> {
+fn read(root: Table<'_>, sources: &Sources) -> Option<Scene> {
     let (kernel, h_over_dx) = kernel(&root);
-    let setting = setting(&root, h_over_dx);
+    let setting = setting(&root, h_over_dx, sources);
     let title = title(&root);
     let material = material::read(&root);
     let (bodies, walls) = geometry::read(&root, &setting);
     let initial = initial::read(&root, &setting, material.as_ref());
+    if bodies.iter().flatten().any(|body| matches!(body.shape, Shape::Release(_))) {
+        initial::on_terrain(&root, initial.as_ref());
+    }
     // With a fault in a body or a wall nothing certain can be said.
     let flow = bodies.as_ref().zip(walls.as_ref()).and_then(|(b, w)| held::what_flows(b, w, &setting));
     let periodic = setting.periodic.iter().any(Option::is_some);
@@ -74,6 +83,8 @@ fn read(root: Table<'_>) -> Option<Scene> {
         material: material?,
         bodies,
         walls: walls?,
+        terrain: if setting.has_terrain { Some(setting.terrain?) } else { None },
+        files: sources.digests(),
         initial: initial?,
         numerics: numerics?,
         end: end?,
@@ -81,13 +92,15 @@ fn read(root: Table<'_>) -> Option<Scene> {
     })
 }
 
-fn setting(root: &Table<'_>, h_over_dx: f64) -> Setting {
+fn setting<'a>(root: &Table<'_>, h_over_dx: f64, sources: &'a Sources) -> Setting<'a> {
     let space = root.needed_choice("space", &Space::ALL.map(|space| (space.name(), space))).map(|found| found.value);
     let spacing = root.needed("spacing", Dimension::Length, &POSITIVE).map(|found| found.value);
     let gravity = gravity(root, space);
     let symmetry = symmetry(root, space, gravity);
     let periodic = period::read(root, space, spacing, symmetry, h_over_dx);
-    Setting { space, spacing, h_over_dx, gravity, symmetry, periodic }
+    let has_terrain = root.has("terrain");
+    let terrain = terrain::read(root, space, spacing, sources);
+    Setting { space, spacing, h_over_dx, gravity, symmetry, periodic, has_terrain, terrain, sources }
 }
 
 fn title(root: &Table<'_>) -> Option<String> {

@@ -5,6 +5,7 @@ use super::{
     check::{AXES, Setting},
     geometry::{PlacedBody, PlacedWall, bounds},
     raw::Faults,
+    release,
 };
 use crate::space::Space;
 
@@ -31,7 +32,7 @@ pub(super) struct Fit<'a> {
     pub faults: &'a Faults<'a>,
     pub space: Space,
     pub spacing: f64,
-    pub setting: &'a Setting,
+    pub setting: &'a Setting<'a>,
 }
 
 impl Fit<'_> {
@@ -150,6 +151,12 @@ impl Fit<'_> {
                 fault(reason);
                 continue;
             }
+            if let Some(terrain) = &self.setting.terrain
+                && let Some(reason) = release::misfit(&placed.body, terrain, self.space, self.spacing, self.setting)
+            {
+                fault(reason);
+                continue;
+            }
             total += self.extent(low, high, walls, &fault);
             self.behind_walls(low, high, walls, &fault);
             self.out_of_periods(low, high, &fault);
@@ -207,6 +214,9 @@ impl Fit<'_> {
     /// Why a shape holds no particle, if it holds none.
     fn emptiness(&self, shape: &Shape) -> Option<String> {
         let dx = self.spacing;
+        if let Shape::Release(release) = shape {
+            return release.emptiness(self.space, dx);
+        }
         let (low, high) = bounds(shape, self.space);
         let is_round = |axis: usize| axis < 2 && matches!(shape, Shape::Cylinder { .. });
         for &axis in self.space.axes().iter().filter(|&&axis| !is_round(axis)) {
@@ -239,6 +249,8 @@ impl Fit<'_> {
             Shape::Box { .. } => {
                 (last_is_kept(0) && last_is_kept(1), format!("size {} m x {} m", high[0] - low[0], high[2] - low[2]))
             }
+            // Looked at above.
+            Shape::Release(_) => (true, String::new()),
             Shape::Wedge { corner, size, falls_left } => {
                 let column = if falls_left { 0.5 } else { first(0, corner[0]) };
                 let kept = !falls_left || !self.is_symmetric(0) || corner[0] / dx - 0.5 > ON_THE_BORDER;
@@ -254,6 +266,9 @@ impl Fit<'_> {
     /// Do two shapes share a volume? Exact, because no shape grows with height: they do where they share a span of
     /// heights and, at its foot, their horizontal sections share an area.
     fn overlap(&self, a: &Shape, b: &Shape) -> bool {
+        if [a, b].iter().any(|shape| matches!(shape, Shape::Release(_))) {
+            return release::overlap(a, b, self.space, self.spacing);
+        }
         let tolerance = TOLERANCE * self.spacing;
         let ((low_a, high_a), (low_b, high_b)) = (bounds(a, self.space), bounds(b, self.space));
         let foot = low_a[2].max(low_b[2]);
@@ -290,7 +305,7 @@ fn section(shape: &Shape, space: Space, z: f64) -> Section {
         Shape::Cylinder { base, radius, .. } if space == Space::ThreeD => {
             return Section::Disc { centre: [base[0], base[1]], radius };
         }
-        Shape::Cylinder { .. } | Shape::Box { .. } => {}
+        Shape::Cylinder { .. } | Shape::Box { .. } | Shape::Release(_) => {}
         Shape::Wedge { corner, size, falls_left } => {
             let length = size[0] * (1.0 - (z - corner[2]) / size[2]);
             if falls_left {

@@ -15,8 +15,11 @@ impl Scene {
     }
 
     /// Height from which heights and potential energies are measured, m: the lowest wall with the material above it, or
-    /// where there is none the lowest point of the bodies.
+    /// where there is none the lowest point of the bodies; the lowest point of a terrain.
     pub fn floor(&self) -> f64 {
+        if let Some(terrain) = &self.terrain {
+            return terrain.ground.range()[0];
+        }
         let walls = self.walls.iter().filter(|w| w.axis == 2 && w.side > 0.0).map(|w| w.at);
         let bodies = self.bodies.iter().map(|b| b.shape.bounds(self.space).0[2]);
         // A checked scene has a body.

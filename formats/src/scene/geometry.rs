@@ -5,6 +5,7 @@ use super::{
     check::{AXES, Setting},
     fit::Fit,
     raw::{ANY, Found, POSITIVE, Table, values},
+    release,
 };
 use crate::{space::Space, units::Dimension};
 
@@ -27,7 +28,7 @@ pub(super) struct PlacedWall {
 }
 
 /// All bodies and all walls; None where one has a fault.
-pub(super) fn read(root: &Table<'_>, setting: &Setting) -> (Option<Vec<Body>>, Option<Vec<Wall>>) {
+pub(super) fn read(root: &Table<'_>, setting: &Setting<'_>) -> (Option<Vec<Body>>, Option<Vec<Wall>>) {
     let faults = root.faults;
     let tables = root.named("body");
     if tables.is_empty() && !root.has("body") {
@@ -54,12 +55,12 @@ pub(super) fn read(root: &Table<'_>, setting: &Setting) -> (Option<Vec<Body>>, O
     (bodies.into_iter().map(|placed| placed.map(|placed| placed.body)).collect(), walls)
 }
 
-fn body(name: String, table: Table<'_>, setting: &Setting) -> Option<PlacedBody> {
+fn body(name: String, table: Table<'_>, setting: &Setting<'_>) -> Option<PlacedBody> {
     let faults = table.faults;
-    let given: Vec<_> = ["cylinder", "box", "wedge"].into_iter().filter(|key| table.has(key)).collect();
+    let given: Vec<_> = ["cylinder", "box", "wedge", "release"].into_iter().filter(|key| table.has(key)).collect();
     match given.as_slice() {
         [] => {
-            let message = "has no shape; one of cylinder, box, wedge is needed";
+            let message = "has no shape; one of cylinder, box, wedge, release is needed";
             faults.structure(table.offset, &table.path, message);
         }
         [_] => {}
@@ -69,9 +70,15 @@ fn body(name: String, table: Table<'_>, setting: &Setting) -> Option<PlacedBody>
         }
     }
     let (cylinder, block, wedge) = (table.child("cylinder"), table.child("box"), table.child("wedge"));
-    let offset = cylinder.offset.max(block.offset).max(wedge.offset);
+    let released = table.child("release");
+    let offset = cylinder.offset.max(block.offset).max(wedge.offset).max(released.offset);
     let key = given.first().map_or(table.path.clone(), |key| table.path_of(key));
-    let shapes = [cylinder_shape(cylinder, setting), box_shape(block, setting), wedge_shape(wedge, setting)];
+    let shapes = [
+        cylinder_shape(cylinder, setting),
+        box_shape(block, setting),
+        wedge_shape(wedge, setting),
+        release::read(released, setting),
+    ];
 
     let velocity = table.vector("velocity", Dimension::Velocity);
     if let (Some([_, y, _]), Some(space @ (Space::PlaneStrain | Space::Axisymmetric))) = (&velocity, setting.space)
@@ -85,7 +92,7 @@ fn body(name: String, table: Table<'_>, setting: &Setting) -> Option<PlacedBody>
     Some(PlacedBody { body: Body { name, shape, velocity }, offset, key })
 }
 
-fn cylinder_shape(table: Table<'_>, setting: &Setting) -> Option<Shape> {
+fn cylinder_shape(table: Table<'_>, setting: &Setting<'_>) -> Option<Shape> {
     if !table.is_there() {
         return None;
     }
@@ -114,7 +121,7 @@ fn cylinder_shape(table: Table<'_>, setting: &Setting) -> Option<Shape> {
     right.then_some(shape)
 }
 
-fn box_shape(table: Table<'_>, setting: &Setting) -> Option<Shape> {
+fn box_shape(table: Table<'_>, setting: &Setting<'_>) -> Option<Shape> {
     if !table.is_there() {
         return None;
     }
@@ -141,7 +148,7 @@ fn box_shape(table: Table<'_>, setting: &Setting) -> Option<Shape> {
     right.then_some(shape)
 }
 
-fn wedge_shape(table: Table<'_>, setting: &Setting) -> Option<Shape> {
+fn wedge_shape(table: Table<'_>, setting: &Setting<'_>) -> Option<Shape> {
     if !table.is_there() {
         return None;
     }
@@ -167,11 +174,11 @@ fn wedge_shape(table: Table<'_>, setting: &Setting) -> Option<Shape> {
     right.then_some(shape)
 }
 
-fn is_3d(setting: &Setting) -> bool {
+fn is_3d(setting: &Setting<'_>) -> bool {
     setting.space == Some(Space::ThreeD)
 }
 
-fn wall(name: String, table: Table<'_>, setting: &Setting) -> Option<PlacedWall> {
+fn wall(name: String, table: Table<'_>, setting: &Setting<'_>) -> Option<PlacedWall> {
     let axis = table.needed_choice("axis", &[("x", 0), ("y", 1), ("z", 2)]);
     let at = table.needed("at", Dimension::Length, &ANY);
     let side = table.needed_choice("side", &[("above", 1.0), ("below", -1.0)]);
@@ -198,12 +205,15 @@ fn wall(name: String, table: Table<'_>, setting: &Setting) -> Option<PlacedWall>
 }
 
 /// Why no wall can be normal to an axis, where none can.
-fn no_walls_along(axis: usize, setting: &Setting) -> Option<String> {
+fn no_walls_along(axis: usize, setting: &Setting<'_>) -> Option<String> {
     let name = AXES[axis];
     match setting.space {
         Some(space) if !space.axes().contains(&axis) => {
             let valid = "valid: \"x\", \"z\"";
             Some(format!("there are no walls normal to {name} in the space \"{}\"; {valid}", space.name()))
+        }
+        _ if axis == 2 && setting.has_terrain => {
+            Some("the terrain is the floor, and nothing may lie above it but air; drop this wall, or [terrain]".into())
         }
         _ if setting.periodic[axis].is_some() => {
             let message = format!("the scene repeats itself along {name}: no wall can be normal to it");
@@ -219,7 +229,7 @@ fn motion_fault<'v>(
     velocity: &'v [Found<f64>; 3],
     normal: usize,
     slip: Slip,
-    setting: &Setting,
+    setting: &Setting<'_>,
 ) -> Option<(&'v Found<f64>, String)> {
     (0..3).filter(|&along| velocity[along].value != 0.0).find_map(|along| {
         let name = AXES[along];
@@ -252,6 +262,7 @@ pub(super) fn bounds(shape: &Shape, space: Space) -> ([f64; 3], [f64; 3]) {
             _ => ([x - radius, y - radius, z], [x + radius, y + radius, z + height]),
         },
         Shape::Box { min, max } => (min, max),
+        Shape::Release(ref release) => release.bounds(space),
         Shape::Wedge { corner: [x, y, z], size: [length, width, height], falls_left } => {
             let (left, right) = if falls_left { (x - length, x) } else { (x, x + length) };
             ([left, y, z], [right, y + width, z + height])

@@ -9,7 +9,7 @@ use super::{
 use crate::space::Space;
 
 /// What lets the material flow, in words; None where it is held on every side and nothing drives it along.
-pub(super) fn what_flows(bodies: &[Body], walls: &[Wall], setting: &Setting) -> Option<String> {
+pub(super) fn what_flows(bodies: &[Body], walls: &[Wall], setting: &Setting<'_>) -> Option<String> {
     let (space, dx, gravity) = (setting.space?, setting.spacing?, setting.gravity?);
     if walls.iter().any(|wall| wall.velocity != [0.0; 3]) {
         return Some("a wall moves".into());
@@ -43,7 +43,7 @@ fn has_flat_sides(shape: &Shape, space: Space) -> bool {
     match shape {
         Shape::Box { .. } => true,
         Shape::Cylinder { .. } => space == Space::Axisymmetric,
-        Shape::Wedge { .. } => false,
+        Shape::Wedge { .. } | Shape::Release(_) => false,
     }
 }
 
@@ -51,7 +51,7 @@ fn has_flat_sides(shape: &Shape, space: Space) -> bool {
 struct Room<'a> {
     bodies: &'a [Body],
     walls: &'a [Wall],
-    setting: &'a Setting,
+    setting: &'a Setting<'a>,
     space: Space,
     /// Widest gap between things that touch: sizes are rounded to spacings, so that a full container may lack one.
     gap: f64,

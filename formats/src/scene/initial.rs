@@ -21,7 +21,7 @@ enum Kind {
 }
 
 /// The state at the start; None where it has a fault, or the law it depends on has.
-pub(super) fn read(root: &Table<'_>, setting: &Setting, material: Option<&Material>) -> Option<Initial> {
+pub(super) fn read(root: &Table<'_>, setting: &Setting<'_>, material: Option<&Material>) -> Option<Initial> {
     let table = root.child("initial");
     let stress = stress(&table, setting, material);
     let lattices =
@@ -49,7 +49,20 @@ pub(super) fn read(root: &Table<'_>, setting: &Setting, material: Option<&Materi
     })
 }
 
-fn stress(table: &Table<'_>, setting: &Setting, material: Option<&Material>) -> Option<InitialStress> {
+/// Released material has columns of its own, that follow the ground.
+pub(super) fn on_terrain(root: &Table<'_>, initial: Option<&Initial>) {
+    let Some(initial) = initial else { return };
+    let table = root.child("initial");
+    let fault = |key: &str, message: &str| table.faults.add(table.child_offset(key), &table.path_of(key), message);
+    if initial.lattice != Lattice::Cubic {
+        fault("lattice", "released material lies in columns that follow the ground: only \"cubic\" is possible");
+    }
+    if initial.relax > 0 {
+        fault("relax", "released material is not relaxed; use jitter");
+    }
+}
+
+fn stress(table: &Table<'_>, setting: &Setting<'_>, material: Option<&Material>) -> Option<InitialStress> {
     let kinds =
         [("zero", Kind::Zero), ("pressure", Kind::Pressure), ("hydrostatic", Kind::Hydrostatic), ("k0", Kind::K0)];
     let kind = table.choice("stress", &kinds);

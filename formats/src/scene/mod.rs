@@ -16,11 +16,17 @@ mod numerics;
 mod period;
 mod periodic_axis;
 mod raw;
+mod release;
+mod sources;
+mod terrain;
 mod walls;
 
 pub use changes::{Change, MAY_CHANGE};
 pub use error::{Fault, SceneError};
 pub use periodic_axis::PeriodicAxis;
+pub use release::{Depth, Release};
+pub use sources::Sources;
+pub use terrain::{Terrain, normal};
 pub use walls::{Parity, Site, WallLattice};
 
 use crate::{kernel::Kernel, space::Space};
@@ -51,6 +57,10 @@ pub struct Scene {
     pub bodies: Vec<Body>,
     /// Planes that hold the material.
     pub walls: Vec<Wall>,
+    /// A floor of any height.
+    pub terrain: Option<Terrain>,
+    /// Files that the scene names, in the order in which they are asked for, and the SHA-256 of what they hold.
+    pub files: Vec<(String, String)>,
     /// Stress and disorder at the start.
     pub initial: Initial,
     /// Numerical parameters.
@@ -251,6 +261,8 @@ pub enum Shape {
         /// Does the slope fall towards smaller x?
         falls_left: bool,
     },
+    /// What lies on the terrain.
+    Release(Release),
 }
 
 /// A plane wall normal to an axis, infinite in its plane.
@@ -401,9 +413,25 @@ pub struct Output {
 }
 
 impl Scene {
-    /// Checks the text of a scene file; `name` is used in messages. All faults are reported at once.
+    /// Checks the text of a scene file; `name` is used in messages, and the files that the scene names are looked for beside
+    /// it, or among the copies where it is the scene of a run folder. All faults are reported at once.
     pub fn read(name: &str, text: &str) -> Result<Self, SceneError> {
-        check::scene(name, text)
+        Self::read_with(name, text, &Sources::of(std::path::Path::new(name)))
+    }
+
+    /// The same with the files that the scene names from `sources`.
+    pub fn read_with(name: &str, text: &str, sources: &Sources) -> Result<Self, SceneError> {
+        check::scene(name, text, sources)
+    }
+
+    /// [`Scene::hash`] of its text, and of what the files hold that it names.
+    pub fn hash_of(&self, text: &str) -> String {
+        let hash = Self::hash(text);
+        if self.files.is_empty() {
+            return hash;
+        }
+        let files: String = self.files.iter().map(|(path, digest)| format!("{path} {digest}\n")).collect();
+        crate::provenance::sha256(format!("{hash}\n{files}").as_bytes())
     }
 
     /// Smoothing length h, m.

@@ -251,6 +251,46 @@ impl<'a> Table<'a> {
         }
     }
 
+    /// The same for a key that must be there; `what` is said to be needed.
+    pub fn needed_text(&self, key: &'static str, what: &str) -> Option<Found<String>> {
+        self.require(key, what);
+        self.text(key)
+    }
+
+    /// An array of points [x, y].
+    pub fn points(&self, key: &'static str, dimension: Dimension) -> Option<Found<Vec<[f64; 2]>>> {
+        let found = self.get(key)?;
+        let example =
+            format!("an array of points [x, y], each of two quantities such as {}, is needed", dimension.example());
+        let DeValue::Array(items) = found.value else {
+            self.faults.at(&found, format!("{example}, not {}", kind(found.value)));
+            return None;
+        };
+        let mut points = Some(Vec::new());
+        for item in items.iter() {
+            let of = |value: &Spanned<DeValue<'_>>| Found { value: (), span: value.span(), key: found.key.clone() };
+            let DeValue::Array(pair) = item.get_ref() else {
+                self.faults.at(&of(item), format!("{example}; this is {}", kind(item.get_ref())));
+                points = None;
+                continue;
+            };
+            let read = |value: &'a Spanned<DeValue<'a>>| {
+                let found = Found { value: value.get_ref(), span: value.span(), key: found.key.clone() };
+                self.quantity(found, dimension, &ANY).map(|found| found.value)
+            };
+            let pair: Vec<Option<f64>> = pair.iter().map(read).collect();
+            match (pair.as_slice(), &mut points) {
+                ([Some(x), Some(y)], Some(points)) => points.push([*x, *y]),
+                ([_, _], _) => points = None,
+                _ => {
+                    self.faults.at(&of(item), format!("has {} values; a point has two, [x, y]", pair.len()));
+                    points = None;
+                }
+            }
+        }
+        points.map(|value| Found { value, span: found.span, key: found.key })
+    }
+
     /// One of several names.
     pub fn choice<T: Copy>(&self, key: &'static str, choices: &[(&str, T)]) -> Option<Found<T>> {
         let found = self.get(key)?;

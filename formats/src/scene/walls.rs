@@ -2,9 +2,17 @@
 //!
 //! Walls are infinite planes, so no file lists their particles: whoever needs some asks for the sites near a point.
 //! A site's place and number follow from its lattice coordinates alone, the same on every rank.
+//!
+//! Over a terrain the lattice is sheared: each column along z is moved so that the border between its cells -1 and 0 lies on
+//! the ground. Cells keep their volume, all sites with k < 0 lie below the ground, and none comes nearer to it than half a
+//! spacing along z, so that there are no steps in the floor.
 
-use super::{PeriodicAxis, Scene, Slip, Wall, WallKind};
+use super::{PeriodicAxis, Scene, Slip, Terrain, Wall, WallKind};
 use crate::space::Space;
+use std::sync::Arc;
+
+/// Lists of neighbours reach less far, in smoothing lengths.
+const FARTHEST: f64 = 2.5;
 
 /// Lattice coordinates of a site; unused axes are zero.
 pub type Site = [i32; 3];
@@ -20,6 +28,27 @@ pub struct WallLattice {
     origin: [f64; 3],
     spacing: f64,
     periods: [Option<PeriodicAxis>; 3],
+    symmetric: [bool; 2],
+    space: Space,
+    terrain: Option<Arc<Floor>>,
+    /// No reach may be larger over a terrain, m.
+    farthest: f64,
+}
+
+/// A terrain, as sites need it.
+#[derive(Debug)]
+struct Floor {
+    terrain: Terrain,
+    /// 1/sqrt(1 + s^2) with the steepest slope s within reach of each cell of the raster: no point of the ground is nearer than
+    /// the height above it times that.
+    nearer: Vec<f64>,
+}
+
+impl Floor {
+    fn new(terrain: &Terrain, reach: f64) -> Self {
+        let nearer = terrain.ground.steepest(reach).into_iter().map(|s| 1.0 / (1.0 + s * s).sqrt()).collect();
+        Self { terrain: terrain.clone(), nearer }
+    }
 }
 
 /// What a wall does to the velocity and the stress extrapolated behind it.
@@ -31,6 +60,8 @@ pub struct Parity {
     pub motion: [f64; 3],
     /// Is the axis reflected in the stress?
     pub reflected: [bool; 3],
+    /// Normal of a free-slip terrain in which both are reflected before that.
+    pub normal: Option<[f64; 3]>,
 }
 
 impl WallLattice {
@@ -51,12 +82,80 @@ impl WallLattice {
         let with_sites = walls.len();
         walls.extend(others);
         let periods = [0, 1, 2].map(|axis| scene.periodic_axis(axis));
-        Self { walls, with_sites, axes: scene.space.axes(), origin, spacing: scene.spacing, periods }
+        let farthest = FARTHEST * scene.h();
+        Self {
+            walls,
+            with_sites,
+            axes: scene.space.axes(),
+            origin,
+            spacing: scene.spacing,
+            periods,
+            symmetric: scene.symmetry,
+            space: scene.space,
+            terrain: scene.terrain.as_ref().map(|terrain| Arc::new(Floor::new(terrain, farthest))),
+            farthest,
+        }
+    }
+
+    /// Where the borders of cells are counted from, m.
+    pub fn origin(&self) -> [f64; 3] {
+        self.origin
+    }
+
+    /// The place whose ground is under a point: beyond planes of symmetry and walls the ground is a mirror image, beyond a period
+    /// it repeats itself.
+    fn fold(&self, x: [f64; 3]) -> [f64; 2] {
+        let mut at = [x[0], if self.space == Space::ThreeD { x[1] } else { 0.0 }];
+        for a in 0..2 {
+            if let Some(period) = self.periods[a] {
+                at[a] = period.wrap(at[a]);
+            }
+            if self.symmetric[a] {
+                at[a] = at[a].abs();
+            }
+            for wall in self.walls.iter().filter(|wall| wall.axis == a) {
+                if wall.side * (at[a] - wall.at) < 0.0 {
+                    at[a] = 2.0 * wall.at - at[a];
+                }
+            }
+        }
+        at
+    }
+
+    /// Height of the ground under a point, m; none without a terrain.
+    pub fn ground(&self, x: [f64; 3]) -> Option<f64> {
+        let [x, y] = self.fold(x);
+        self.terrain.as_ref().map(|floor| floor.terrain.height(x, y))
+    }
+
+    /// Is there a terrain?
+    pub fn has_terrain(&self) -> bool {
+        self.terrain.is_some()
+    }
+
+    /// Where a point lies below the ground: the ground's normal, the distance to the plane across it, m, and whether the ground
+    /// is smooth.
+    pub fn below_ground(&self, x: [f64; 3]) -> Option<([f64; 3], f64, bool)> {
+        let floor = self.terrain.as_ref()?;
+        let at = self.fold(x);
+        let depth = floor.terrain.height(at[0], at[1]) - x[2];
+        (depth > 0.0).then(|| {
+            let normal = self.normal(floor, x);
+            (normal, depth * normal[2], floor.terrain.slip == Slip::FreeSlip)
+        })
+    }
+
+    /// Lower bound of the distance to the ground, m; negative below it, infinite without a terrain.
+    fn above_ground(&self, x: [f64; 3]) -> f64 {
+        let Some(floor) = &self.terrain else { return f64::INFINITY };
+        let at = self.fold(x);
+        let height = x[2] - floor.terrain.height(at[0], at[1]);
+        if height > 0.0 { height * floor.nearer[floor.terrain.ground.cell_of(at[0], at[1])] } else { height }
     }
 
     /// Place of a site, m: the middle of its cell. Sites a period apart are exactly a period apart.
     pub fn position(&self, site: Site) -> [f64; 3] {
-        let mut x = [0.0; 3];
+        let (mut x, mut home) = ([0.0; 3], [0.0; 3]);
         for &a in self.axes {
             let place = |i: i32| self.origin[a] + (f64::from(i) + 0.5) * self.spacing;
             x[a] = match self.periods[a] {
@@ -64,9 +163,16 @@ impl WallLattice {
                 Some(period) => {
                     let cells = (period.length / self.spacing).round() as i32;
                     let periods = f64::from(site[a].div_euclid(cells));
-                    period.round(place(site[a].rem_euclid(cells))) + periods * period.length
+                    home[a] = period.round(place(site[a].rem_euclid(cells)));
+                    home[a] + periods * period.length
                 }
             };
+            if self.periods[a].is_none() {
+                home[a] = x[a];
+            }
+        }
+        if let Some(ground) = self.ground(home) {
+            x[2] = ground + (f64::from(site[2]) + 0.5) * self.spacing;
         }
         x
     }
@@ -77,19 +183,20 @@ impl WallLattice {
         1 << 63 | part(site[2]) << 42 | part(site[1]) << 21 | part(site[0])
     }
 
-    /// Signed distance of a point to the nearest wall, m: positive on the material's side, infinite without walls.
+    /// Signed distance of a point to the nearest wall, m: positive on the material's side, infinite without walls. Above a terrain
+    /// it may be less, but is never more.
     pub fn distance(&self, x: [f64; 3]) -> f64 {
-        nearest(&self.walls, x)
+        nearest(&self.walls, x).min(self.above_ground(x))
     }
 
     /// The same to the nearest wall that has sites.
     pub fn distance_of_sites(&self, x: [f64; 3]) -> f64 {
-        nearest(&self.walls[..self.with_sites], x)
+        nearest(&self.walls[..self.with_sites], x).min(self.above_ground(x))
     }
 
     /// Is there a wall that has sites?
     pub fn has_sites(&self) -> bool {
-        self.with_sites > 0
+        self.with_sites > 0 || self.terrain.is_some()
     }
 
     /// The walls with sites that a point lies behind.
@@ -102,8 +209,16 @@ impl WallLattice {
     /// the corrections that only shear components with one normal index change sign, and that a wall may slide along
     /// itself with a velocity V; in the corner of two no-slip walls V is the mean of theirs).
     pub fn parity(&self, x: [f64; 3]) -> Parity {
-        let mut parity = Parity { velocity: [1.0; 3], motion: [0.0; 3], reflected: [false; 3] };
+        let mut parity = Parity { velocity: [1.0; 3], motion: [0.0; 3], reflected: [false; 3], normal: None };
         let mut stuck = 0.0;
+        if let Some(floor) = &self.terrain
+            && self.above_ground(x) < 0.0
+        {
+            match floor.terrain.slip {
+                Slip::NoSlip => stuck += 1.0,
+                Slip::FreeSlip => parity.normal = Some(self.normal(floor, x)),
+            }
+        }
         for wall in self.behind(x) {
             match wall.slip {
                 Slip::NoSlip => {
@@ -125,8 +240,23 @@ impl WallLattice {
         parity
     }
 
+    /// Normal of the ground under a point: mirrored with it.
+    fn normal(&self, floor: &Floor, x: [f64; 3]) -> [f64; 3] {
+        let at = self.fold(x);
+        let mut normal = floor.terrain.normal(self.space, at[0], at[1]);
+        for a in 0..2 {
+            let mirrored = self.symmetric[a] && x[a] < 0.0;
+            let behind = |wall: &&Wall| wall.axis == a && wall.side * (x[a] - wall.at) < 0.0;
+            if mirrored || self.walls.iter().any(|wall| behind(&wall)) {
+                normal[a] = -normal[a];
+            }
+        }
+        normal
+    }
+
     /// Calls `visit` for every wall site within `reach` of `x`.
     pub fn near(&self, x: [f64; 3], reach: f64, mut visit: impl FnMut(Site)) {
+        debug_assert!(self.terrain.is_none() || reach <= self.farthest);
         if self.distance_of_sites(x) >= reach {
             return;
         }
@@ -136,6 +266,9 @@ impl WallLattice {
             low[a] = (s - reach / self.spacing).ceil() as i32;
             high[a] = (s + reach / self.spacing).floor() as i32;
         }
+        if self.terrain.is_some() {
+            return self.near_terrain(x, reach, [low, high], visit);
+        }
         for k in low[2]..=high[2] {
             for j in low[1]..=high[1] {
                 for i in low[0]..=high[0] {
@@ -144,6 +277,30 @@ impl WallLattice {
                     let r2: f64 = self.axes.iter().map(|&a| (p[a] - x[a]).powi(2)).sum();
                     if r2 < reach * reach && self.distance_of_sites(p) < 0.0 {
                         visit(site);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl WallLattice {
+    /// The same column by column, each with its own height.
+    fn near_terrain(&self, x: [f64; 3], reach: f64, [low, high]: [Site; 2], mut visit: impl FnMut(Site)) {
+        for j in low[1]..=high[1] {
+            for i in low[0]..=high[0] {
+                let foot = self.position([i, j, 0]);
+                let across: f64 = self.axes.iter().filter(|&&a| a < 2).map(|&a| (foot[a] - x[a]).powi(2)).sum();
+                let left = reach * reach - across;
+                if left <= 0.0 {
+                    continue;
+                }
+                let (layers, middle) = (left.sqrt() / self.spacing, (x[2] - foot[2]) / self.spacing);
+                for k in (middle - layers).ceil() as i32..=(middle + layers).floor() as i32 {
+                    let p = self.position([i, j, k]);
+                    let r2 = across + (p[2] - x[2]).powi(2);
+                    if r2 < reach * reach && (k < 0 || nearest(&self.walls[..self.with_sites], p) < 0.0) {
+                        visit([i, j, k]);
                     }
                 }
             }
@@ -176,9 +333,10 @@ mod tests {
     #[test]
     fn walls_turn_what_is_extrapolated() {
         let smooth = lattice(&format!("{FLOOR}{SIDE}\"free-slip\"\n"));
-        let moving = Parity { velocity: [-1.0; 3], motion: [1.0, 0.0, 0.0], reflected: [false; 3] };
+        let moving = Parity { velocity: [-1.0; 3], motion: [1.0, 0.0, 0.0], reflected: [false; 3], normal: None };
         assert_eq!(smooth.parity([0.05, 0.0, -0.01]), moving);
-        let side = Parity { velocity: [-1.0, 1.0, 1.0], motion: [0.0; 3], reflected: [true, false, false] };
+        let side =
+            Parity { velocity: [-1.0, 1.0, 1.0], motion: [0.0; 3], reflected: [true, false, false], normal: None };
         assert_eq!(smooth.parity([0.11, 0.0, 0.05]), side);
         let corner = Parity { velocity: [1.0, -1.0, -1.0], reflected: side.reflected, ..moving };
         assert_eq!(smooth.parity([0.11, 0.0, -0.01]), corner);

@@ -1,6 +1,9 @@
 //! What the result files say: names, units and meaning of every variable.
 
 mod inside;
+mod terrain;
+
+pub use terrain::terrain;
 
 use crate::{
     analysis::{Analysis, Moment},

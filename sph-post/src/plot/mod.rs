@@ -17,6 +17,7 @@ mod series;
 mod shear;
 mod stress;
 mod surfaces;
+mod terrain;
 mod top_view;
 
 use crate::{analysis::Analysis, failure::Failure, geometry::Law};
@@ -42,6 +43,7 @@ pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Fail
         failure_plane::draw,
         top_view::draw,
         shear::draw,
+        terrain::draw,
         stress::draw,
         basal::draw,
         basal_normalised::draw,

@@ -7,6 +7,7 @@
 
 use crate::algebra::Vector;
 use crate::boundary::mirror::reflect_stress;
+use crate::boundary::periodic::Periods;
 use crate::neighbors::{Neighbors, blocks_order};
 use crate::particles::Particles;
 use crate::physics::Kernel;
@@ -42,6 +43,34 @@ impl Walls {
     /// Signed distance of a point to the nearest wall of any kind, m.
     pub fn distance<const D: usize, const N: usize, S: Space<D, N>>(&self, x: Vector<D>) -> f64 {
         self.lattice.distance(S::to_disk(x))
+    }
+
+    /// Puts owned particles back that have come below a terrain in a drift of length `dt`: the virtual particles carry what is
+    /// dense, but not what flies alone. They lose the velocity into the ground and, unless that is smooth, as much of that along
+    /// it; nothing moves further than it would have gone without the ground.
+    pub fn keep_above<const D: usize, const N: usize, S: Space<D, N>>(
+        &self,
+        p: &mut Particles<D, N>,
+        periods: &Periods<D>,
+        dt: f64,
+    ) {
+        if !self.lattice.has_terrain() {
+            return;
+        }
+        for i in 0..p.owned {
+            let Some((n, depth, smooth)) = self.lattice.below_ground(S::to_disk(p.x[i])) else { continue };
+            let v = S::to_disk(p.v[i]);
+            let into: f64 = -(0..3).map(|a| v[a] * n[a]).sum::<f64>();
+            if into <= 0.0 {
+                continue;
+            }
+            let back = depth.min(2.0 * into * dt);
+            p.x[i] = p.x[i] + periods.rounded(S::from_disk(n.map(|n| n * back)));
+            let along = [0, 1, 2].map(|a| v[a] + into * n[a]);
+            let speed = along.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let kept = if smooth { 1.0 } else { (1.0 - into / speed.max(into)).max(0.0) };
+            p.v[i] = S::from_disk(along.map(|v| v * kept));
+        }
     }
 
     /// Appends the wall sites within `reach` of owned particles.
@@ -81,6 +110,9 @@ impl Walls {
         extrapolate::<D, K, _>(neighbors, pairs, &mut p.v);
         for (parity, kept) in self.parities.iter().zip(&mut p.v[p.mirror..]) {
             let mut v = S::to_disk(*kept);
+            if let Some(n) = parity.normal {
+                v = reflect_velocity(v, n);
+            }
             for a in 0..3 {
                 v[a] = v[a] * parity.velocity[a] + parity.motion[a];
             }
@@ -97,12 +129,62 @@ impl Walls {
     ) {
         extrapolate::<D, K, _>(neighbors, pairs, &mut p.stress);
         for (parity, kept) in self.parities.iter().zip(&mut p.stress[p.mirror..]) {
-            *kept = S::stress_from_disk(reflect_stress(S::stress_to_disk(*kept), parity.reflected));
+            let mut stress = S::stress_to_disk(*kept);
+            if let Some(n) = parity.normal {
+                stress = reflect_stress_in(stress, n);
+            }
+            *kept = S::stress_from_disk(reflect_stress(stress, parity.reflected));
         }
     }
+}
+
+/// v - 2 (v.n) n
+fn reflect_velocity(v: [f64; 3], n: [f64; 3]) -> [f64; 3] {
+    let across: f64 = (0..3).map(|a| v[a] * n[a]).sum();
+    [0, 1, 2].map(|a| v[a] - 2.0 * across * n[a])
+}
+
+/// R sigma R with R = 1 - 2 n n^T, in the order XX YY ZZ XY YZ XZ: sigma - 2 (t n^T + n t^T) + 4 (n.t) n n^T with the traction
+/// t = sigma n.
+fn reflect_stress_in(s: [f64; 6], n: [f64; 3]) -> [f64; 6] {
+    let t = [
+        s[0] * n[0] + s[3] * n[1] + s[5] * n[2],
+        s[3] * n[0] + s[1] * n[1] + s[4] * n[2],
+        s[5] * n[0] + s[4] * n[1] + s[2] * n[2],
+    ];
+    let normal: f64 = (0..3).map(|a| n[a] * t[a]).sum();
+    let part = |a: usize, b: usize| 4.0 * normal * n[a] * n[b] - 2.0 * (t[a] * n[b] + n[a] * t[b]);
+    let places = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+    std::array::from_fn(|k| s[k] + part(places[k].0, places[k].1))
 }
 
 fn unique(sites: &mut Vec<(u64, Site)>) {
     sites.sort_unstable_by_key(|(key, _)| *key);
     sites.dedup_by_key(|(key, _)| *key);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_normal_along_an_axis_reflects_as_that_axis_does() {
+        let (s, v) = ([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [1.0, 2.0, 3.0]);
+        assert_eq!(reflect_stress_in(s, [0.0, 0.0, 1.0]), reflect_stress(s, [false, false, true]));
+        assert_eq!(reflect_velocity(v, [0.0, 0.0, 1.0]), [1.0, 2.0, -3.0]);
+    }
+
+    #[test]
+    fn on_a_tilted_plane_the_shear_traction_turns_around_and_the_normal_one_stays() {
+        let (s, n) = ([-3.0, -1.0, -7.0, 0.5, -0.25, 2.0], [-0.6, 0.0, 0.8]);
+        let traction = |s: [f64; 6]| [s[0] * n[0] + s[5] * n[2], s[3] * n[0] + s[4] * n[2], s[5] * n[0] + s[2] * n[2]];
+        let (before, after) = (traction(s), traction(reflect_stress_in(s, n)));
+        let normal: f64 = (0..3).map(|a| before[a] * n[a]).sum();
+        for a in 0..3 {
+            let shear = before[a] - normal * n[a];
+            assert!((after[a] - (normal * n[a] - shear)).abs() < 1e-14, "{after:?}");
+        }
+        let twice = reflect_stress_in(reflect_stress_in(s, n), n);
+        assert!(twice.iter().zip(s).all(|(a, b)| (a - b).abs() < 1e-14));
+    }
 }

@@ -23,8 +23,14 @@ pub fn agree<T>(comm: &Communicator, act: impl FnOnce() -> Result<T, RunError>) 
 
 /// A text that rank 0 finds and all ranks get. Collective.
 pub fn share_text(comm: &Communicator, find: impl FnOnce() -> Result<String, RunError>) -> Result<String, RunError> {
+    let bytes = share_bytes(comm, || find().map(String::into_bytes))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// Bytes that rank 0 finds and all ranks get. Collective.
+pub fn share_bytes(comm: &Communicator, find: impl FnOnce() -> Result<Vec<u8>, RunError>) -> Result<Vec<u8>, RunError> {
     let root = comm.process_at_rank(0);
-    let mut bytes = agree(comm, find)?.unwrap_or_default().into_bytes();
+    let mut bytes = agree(comm, find)?.unwrap_or_default();
     let mut length = bytes.len() as u64;
     root.broadcast_into(&mut length);
     bytes.resize(length as usize, 0);
@@ -32,5 +38,5 @@ pub fn share_text(comm: &Communicator, find: impl FnOnce() -> Result<String, Run
     if length > 0 {
         root.broadcast_into(&mut bytes[..]);
     }
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    Ok(bytes)
 }

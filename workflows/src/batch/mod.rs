@@ -5,7 +5,11 @@ mod script;
 mod slurm;
 
 use crate::{cases, cases::Case, failure::Failure, paths, stage};
-use formats::{disk, exit, folder::RunFolder, scene::Scene};
+use formats::{
+    disk, exit,
+    folder::RunFolder,
+    scene::{Scene, Sources},
+};
 use std::path::{Path, PathBuf};
 
 /// How a run is put into jobs.
@@ -116,8 +120,9 @@ fn scene_of_job(folder: &Path) -> PathBuf {
 fn queued(case: &Case, folder: &Path) -> Result<PathBuf, Failure> {
     let text = std::fs::read_to_string(&case.scene)
         .map_err(|e| Failure::no_input(format!("{}: cannot read the scene: {e}", case.scene.display())))?;
-    let scene = Scene::read(&paths::short(&case.scene).display().to_string(), &text);
-    scene.map_err(|faults| Failure { code: exit::USAGE, message: faults.to_string() })?;
+    let name = paths::short(&case.scene).display().to_string();
+    let scene = Scene::read_with(&name, &text, &Sources::of(&case.scene));
+    let scene = scene.map_err(|faults| Failure { code: exit::USAGE, message: faults.to_string() })?;
     let cannot = |e: std::io::Error| Failure::cannot_write(format!("{}: cannot make it: {e}", folder.display()));
     let write = || {
         let written = disk::write_atomic(&scene_of_job(folder), text.as_bytes());
@@ -127,7 +132,7 @@ fn queued(case: &Case, folder: &Path) -> Result<PathBuf, Failure> {
     let advice = "choose another folder with --out, or remove this one";
     match std::fs::read_to_string(RunFolder::new(folder).scene()) {
         // The job itself compares: it hands what has changed to sph-run.
-        Ok(then) => match Scene::changes(&paths::short(&case.scene).display().to_string(), &then, &text) {
+        Ok(then) => match Scene::changes_in(&RunFolder::new(folder), &then, &case.scene, &name, &text) {
             Ok(changes) if changes.is_empty() => drop(std::fs::remove_file(scene_of_job(folder))),
             Ok(changes) => {
                 changes.iter().for_each(|change| eprintln!("talus: {shown}: the scene has changed: {change}"));
@@ -138,6 +143,13 @@ fn queued(case: &Case, folder: &Path) -> Result<PathBuf, Failure> {
                 return Err(Failure::cannot_write(what));
             }
         },
+        // The job has the text of the scene, not the files beside it.
+        Err(_) if !scene.files.is_empty() => {
+            let advice = format!("prepare it first: sph-prep {name} -o {shown}; then the same command");
+            return Err(Failure::usage(format!(
+                "{name} names files, which a job cannot find from its folder; {advice}"
+            )));
+        }
         // Nothing is prepared yet.
         Err(_) if scene_of_job(folder).is_file() => write()?,
         Err(_) if stage::is_occupied(folder) => {

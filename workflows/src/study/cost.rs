@@ -40,6 +40,9 @@ fn particles(scene: &Scene) -> f64 {
         (Shape::Cylinder { radius, height, .. }, _) => radius * height / (dx * dx),
         (Shape::Box { min, max }, Space::ThreeD) => (0..3).map(|k| (max[k] - min[k]) / dx).product(),
         (Shape::Box { min, max }, _) => (max[0] - min[0]) * (max[2] - min[2]) / (dx * dx),
+        (Shape::Release(release), space) => {
+            release.volume(space, scene.symmetry, dx) / dx.powi(space.dimension() as i32)
+        }
         (Shape::Wedge { size, .. }, Space::ThreeD) => 0.5 * size[0] * size[1] * size[2] / dx.powi(3),
         (Shape::Wedge { size, .. }, _) => 0.5 * size[0] * size[2] / (dx * dx),
     };
@@ -51,6 +54,10 @@ fn height(scene: &Scene) -> f64 {
         Shape::Cylinder { height, .. } => *height,
         Shape::Box { min, max } => max[2] - min[2],
         Shape::Wedge { size, .. } => size[2],
+        Shape::Release(_) => {
+            let (low, high) = shape.bounds(scene.space);
+            high[2] - low[2]
+        }
     };
     scene.bodies.iter().map(|body| of(&body.shape)).fold(0.0, f64::max)
 }

@@ -8,7 +8,12 @@ mod report;
 
 use crate::{cases, failure::Failure, launch, paths, stage};
 use checks::{Check, Target, Validation};
-use formats::{exit, folder::RunFolder, scene::Scene, snapshot};
+use formats::{
+    exit,
+    folder::RunFolder,
+    scene::{self, Scene},
+    snapshot,
+};
 use measure::{Measure, Run};
 use record::{Earlier, Record, Sources};
 use std::collections::BTreeMap;
@@ -57,7 +62,8 @@ fn run(
     let found = cases::find(case)?;
     let text = std::fs::read_to_string(&found.scene)
         .map_err(|e| Failure::no_input(format!("{}: cannot read the scene: {e}", found.scene.display())))?;
-    let scene = Scene::read(case, &text).map_err(|e| Failure::usage(e.to_string()))?;
+    let scene =
+        Scene::read_with(case, &text, &scene::Sources::of(&found.scene)).map_err(|e| Failure::usage(e.to_string()))?;
     let folder = paths::runs().join("validation").join(&found.name);
     let job = stage::Job {
         scene: &found.scene,
