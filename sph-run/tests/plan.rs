@@ -123,6 +123,7 @@ fn options(ranks: &[u64]) -> Options {
         bandwidth,
         overlap,
         sample: 40_000_000,
+        beside: None,
         json: true,
         migration: None,
     }

@@ -55,6 +55,10 @@ pub struct Options {
     #[arg(value_parser = clap::value_parser!(u64).range(1000..))]
     pub sample: u64,
 
+    /// Predict with this cost, too; told by --json alone.
+    #[arg(long, hide = true, value_name = "MICROSECONDS", requires = "plan", value_parser = positive)]
+    pub beside: Option<f64>,
+
     /// As one JSON object, for scripts.
     #[arg(long, requires = "plan")]
     pub json: bool,
@@ -128,7 +132,8 @@ pub fn plan(path: &Path, options: &Options) -> Result<String, RunError> {
         .map(|&ranks| {
             let partition = Partition::of(&source.scene, &source.points, ranks as usize).weighed(source.weight);
             let predicted = cost::predict(&partition, &costs, &machine);
-            table::Row { partition, predicted }
+            let beside = options.beside.map(|cost| cost::predict(&partition, &Costs::given(cost), &machine));
+            table::Row { partition, predicted, beside }
         })
         .collect();
     let table = table::Table { source: &source, costs: &costs, machine: &machine, rows: &rows };

@@ -16,6 +16,8 @@ const WORTHWHILE: f64 = 0.7;
 pub struct Row {
     pub partition: Partition,
     pub predicted: Predicted,
+    /// With another cost of a particle.
+    pub beside: Option<Predicted>,
 }
 
 /// All of a plan.
@@ -91,7 +93,7 @@ impl Table<'_> {
             "whole run",
         ];
         let cells = rows.iter().map(|row| {
-            let Row { partition, predicted } = row;
+            let Row { partition, predicted, .. } = row;
             [
                 row.ranks().to_string(),
                 format!("{:.0}", partition.mean(|load| load.owned)),
@@ -164,7 +166,7 @@ impl Table<'_> {
 
     pub fn json(&self) -> String {
         let row = |row: &Row| -> Value {
-            let Row { partition, predicted } = row;
+            let Row { partition, predicted, beside } = row;
             let total = |of: fn(&Load) -> u64| partition.sum(of);
             json!({
                 "ranks": row.ranks(),
@@ -191,6 +193,7 @@ impl Table<'_> {
                 "seconds-computing": predicted.computing,
                 "efficiency": predicted.efficiency,
                 "overhead": predicted.overhead,
+                "beside-seconds-per-step": beside.map(|beside| beside.step),
                 "faults": partition.faults,
             })
         };
