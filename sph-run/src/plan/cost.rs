@@ -17,12 +17,13 @@ use super::partition::{Load, Partition};
 use formats::space::Space;
 
 /// Cost of a copy over that of an owned particle: it is sent, received, laid out for the sweeps and sorted into lists, but
-/// has no sum of its own.
-const COPY: f64 = 0.15;
+/// has no sum of its own. Measured, as the two below, with 64 000 particles in three dimensions: 0 while lists serve, 0.1 with
+/// two ranks of 900 in motion.
+const COPY: f64 = 0.08;
 /// The same of an image.
-const IMAGE: f64 = 0.15;
+const IMAGE: f64 = 0.14;
 /// The same of a wall particle, whose velocity and stress are sums over the material.
-const WALL: f64 = 0.5;
+const WALL: f64 = 0.6;
 /// Steps between two builds of the lists, about.
 const STEPS_PER_LIST: f64 = 10.0;
 
@@ -45,7 +46,7 @@ impl Costs {
     pub fn of_space(space: Space) -> Self {
         let microseconds = match space {
             Space::PlaneStrain | Space::Axisymmetric => 0.5,
-            Space::ThreeD => 1.0,
+            Space::ThreeD => 1.1,
         };
         Self { particle: 1e-6 * microseconds, origin: format!("default of {}", space.name()) }
     }
@@ -127,7 +128,7 @@ mod tests {
         let one = partition(vec![Load { owned: 1000, images: 100, walls: 200, ..Load::default() }], 200);
         let machine = Machine { latency: 1.0, bandwidth: 1.0, overlap: 0.0 };
         let predicted = predict(&one, &COSTS(), &machine);
-        assert!((predicted.step / 1.115e-3 - 1.0).abs() < 1e-12, "{predicted:?}");
+        assert!((predicted.step / 1.134e-3 - 1.0).abs() < 1e-12, "{predicted:?}");
         assert!((predicted.efficiency - 1.0).abs() < 1e-12 && (predicted.overhead - 1.0).abs() < 1e-12);
     }
 
@@ -139,7 +140,7 @@ mod tests {
             predict(&two, &COSTS(), &Machine { latency, bandwidth, overlap }).step
         };
         let free = network(1e-300, 1e300, 0.0);
-        assert!((free / 1.015e-3 - 1.0).abs() < 1e-9, "{free}");
+        assert!((free / 1.008e-3 - 1.0).abs() < 1e-9, "{free}");
         // Two messages, two hops of the reduction; three messages and one hop every tenth step.
         let slow = network(1e-3, 1e300, 0.0) - free;
         assert!((slow / 4.4e-3 - 1.0).abs() < 1e-9, "{slow}");
@@ -149,15 +150,15 @@ mod tests {
         assert!((network(1e-300, 1e6, 1.0) - free - 0.1 * (0.0024 + 128e-6)).abs() < 1e-12);
         let efficiency = predict(&two, &COSTS(), &Machine { latency: 1e-300, bandwidth: 1e300, overlap: 0.0 });
         assert!(
-            (efficiency.efficiency - 1600.0 / 2030.0).abs() < 1e-9
-                && (efficiency.overhead - 1630.0 / 1600.0).abs() < 1e-9
+            (efficiency.efficiency - 1600.0 / 2016.0).abs() < 1e-9
+                && (efficiency.overhead - 1616.0 / 1600.0).abs() < 1e-9
         );
     }
 
     #[test]
     fn the_cost_of_a_run_is_what_its_log_says() {
         let loads = vec![Load { owned: 1000, copies: 1000, ..Load::default() }; 2];
-        let log = Log { ranks: 2, seconds_per_step: 2.3e-3, origin: "log".into() };
+        let log = Log { ranks: 2, seconds_per_step: 2.16e-3, origin: "log".into() };
         let costs = Costs::measured(&log, &partition(loads, 0));
         assert!((costs.particle / 2e-6 - 1.0).abs() < 1e-12, "{costs:?}");
     }

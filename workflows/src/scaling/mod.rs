@@ -79,11 +79,11 @@ impl Sizes {
             cores: vec![32, 64, 128, 256, 512, 1024],
             per_core: vec![125_000, 250_000, 500_000],
             total: vec![8 * million, 16 * million, 32 * million],
-            sample: 8 * million,
+            sample: 2 * million,
             partitions: vec![(8 * million, vec![64, 1024]), (32 * million, vec![256, 4096])],
             migrating: vec![4, 16, 64],
             migrating_virtually: 1024,
-            migrants: 2 * million,
+            migrants: million,
         }
     }
 }
