@@ -164,10 +164,11 @@ fn a_plan_says_what_is_asked_and_what_is_wrong() {
     let hidden = json(&Options { bandwidth: 0.001, overlap: 1.0, ..options(&[4]) });
     assert!(of(&narrow, 0, "seconds-per-step") > 2.0 * of(&hidden, 0, "seconds-per-step"), "{narrow}");
 
-    // A sample of a scene stands for all of it: its shell is as thick as reach has it.
+    // A sample of a scene stands for all of it. Its halo is as thick as the reach, 2.76 spacings; that of a lattice has only the
+    // two or three planes that lie within.
     let sampled = json(&Options { sample: 4000, ..options(&[8]) });
     let whole = json(&options(&[8]));
-    for (name, tolerance) in [("owned", 0.03), ("imbalance", 0.1), ("halo-share", 0.2), ("walls-unique", 0.1)] {
+    for (name, tolerance) in [("owned", 0.03), ("imbalance", 0.1), ("halo-share", 0.38), ("walls-unique", 0.1)] {
         let ratio = of(&sampled, 0, name) / of(&whole, 0, name);
         assert!((ratio - 1.0).abs() < tolerance, "{name}: {ratio}");
     }

@@ -160,9 +160,6 @@ fn words(options: &Options) -> String {
     if options.quick {
         words += " --quick";
     }
-    if let Some(folder) = &options.programs {
-        words += &format!(" --programs {}", folder.display());
-    }
     words
 }
 

@@ -85,7 +85,9 @@ fn predicted(text: &mut String, set: &Set, cost: f64) {
         "## Predicted: {} scaling\n\n![Efficiency over cores]({})\n\n\
          Efficiency relative to {first} cores. Yang et al. measured {low:.1} to {high:.1} % at 1024 cores, with exchange partly \
          hidden behind computation and with about {YANGS_COST} us a particle and step; here it is {cost:.3} us, so the same \
-         exchange weighs {:.0} times as much.\n\n\
+         exchange weighs {:.0} times as much. Above 100 % where finer particles have fewer wall particles beside them. Samples of \
+         large cases stand for material in disorder, whose halo is as thick as the reach; on the lattice of the start it is \
+         thinner by about a quarter.\n\n\
          | case | {last} cores | with {YANGS_COST} us a particle | ms a step | max/mean owned | halo : owned | messages a step, most | MB a step, most |\n\
          |---|---|---|---|---|---|---|---|\n",
         set.name(),
