@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::lanes::Instructions;
+use crate::plan;
 use clap::{Parser, ValueEnum, ValueHint};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -17,7 +18,7 @@ use std::time::Duration;
 70 numerical failure, 73 cannot write, 75 stopped early (the same command resumes), 76 locked by another run."
 )]
 pub struct Cli {
-    /// The run folder made by sph-prep.
+    /// The run folder made by sph-prep; for --plan also a scene file.
     #[arg(value_hint = ValueHint::DirPath)]
     pub run: PathBuf,
 
@@ -84,6 +85,9 @@ pub struct Cli {
     /// How long MPI may take to start.
     #[arg(long, hide = true, default_value = "10min", value_parser = duration)]
     pub mpi_patience: Duration,
+
+    #[command(flatten)]
+    pub plan: plan::Options,
 }
 
 /// The default of `--mpi-patience`.

@@ -38,6 +38,8 @@ pub enum RunError {
     LimitTooShort(String),
     #[error("{0}")]
     NoSuchInstructions(String),
+    #[error("{0}")]
+    Plan(String),
     /// On a rank that learnt of rank 0's failure; rank 0 tells the user.
     #[error("rank 0 failed")]
     Elsewhere { code: i32 },
@@ -54,7 +56,8 @@ impl RunError {
             | Self::HasBegun { .. }
             | Self::EndHasPassed { .. }
             | Self::LimitTooShort(_)
-            | Self::NoSuchInstructions(_) => exit::USAGE,
+            | Self::NoSuchInstructions(_)
+            | Self::Plan(_) => exit::USAGE,
             Self::Numerical { .. } => exit::NUMERICAL,
             Self::Input { .. } => exit::NO_INPUT,
             Self::CannotWrite { .. } => exit::CANNOT_WRITE,

@@ -22,6 +22,7 @@ pub mod parallel;
 pub mod particles;
 pub mod phases;
 pub mod physics;
+pub mod plan;
 pub mod progress;
 pub mod rates;
 pub mod report;

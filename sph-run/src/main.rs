@@ -15,7 +15,7 @@ use sph_run::limits::Limits;
 use sph_run::parallel::agree::{agree, share_bytes, share_text};
 use sph_run::resume::{Past, Start, read_scene};
 use sph_run::run::{Outcome, Run};
-use sph_run::{check, dispatch, parallel, scheduler};
+use sph_run::{check, dispatch, parallel, plan, scheduler};
 use std::io::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -40,6 +40,9 @@ fn main() {
     if let Ok(Cli { check: true, run, .. }) = &cli {
         std::process::exit(check::report(&RunFolder::new(run)));
     }
+    if let Ok(Cli { run, plan: options @ plan::Options { plan: true, .. }, .. }) = &cli {
+        std::process::exit(plan::report(run, options));
+    }
     let patience = cli.as_ref().map_or(cli::MPI_PATIENCE, |cli| cli.mpi_patience);
     let starting = end_unless_started_within(patience);
     let Some(universe) = mpi::initialize() else {
@@ -50,6 +53,9 @@ fn main() {
     let comm = universe.world();
     abort_all_ranks_on_panic();
     let code = match cli {
+        Ok(Cli { plan: plan::Options { migration: Some(particles), .. }, .. }) => {
+            plan::migration::report(&comm, particles)
+        }
         Ok(cli) => launch(&comm, &cli, signalled, begun),
         Err(error) => {
             if comm.rank() == 0 {

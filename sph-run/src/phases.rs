@@ -2,7 +2,7 @@
 //! launch that took a step. It costs a look at the clock whenever the phase changes, and nothing per particle.
 
 use crate::algebra::Vector;
-use crate::parallel::Reduce;
+use crate::parallel::{Reduce, processor};
 use crate::physics::Physics;
 use crate::simulation::Simulation;
 use formats::folder::RunFolder;
@@ -74,13 +74,29 @@ pub struct Stopwatch {
     /// When the phase began.
     since: Instant,
     begun: Instant,
+    /// Processor time, but for what calls of MPI take, before the phase began; of output nothing counts.
+    computed: Duration,
+    /// The same up to where output last ended.
+    counted_from: Duration,
+}
+
+/// Processor time of this rank in which it did not wait for others.
+fn computing() -> Duration {
+    processor::time().saturating_sub(processor::waited())
 }
 
 impl Stopwatch {
     /// Starts now, between two steps.
     pub fn start() -> Self {
         let now = Instant::now();
-        Self { spent: [Duration::ZERO; Phase::ALL.len()], phase: Phase::Output, since: now, begun: now }
+        Self {
+            spent: [Duration::ZERO; Phase::ALL.len()],
+            phase: Phase::Output,
+            since: now,
+            begun: now,
+            computed: Duration::ZERO,
+            counted_from: Duration::ZERO,
+        }
     }
 
     /// What follows belongs to `phase`. Returns the one that ends, for who goes back to it.
@@ -88,7 +104,21 @@ impl Stopwatch {
         let now = Instant::now();
         self.spent[self.phase as usize] += now - self.since;
         self.since = now;
+        match (self.phase, phase) {
+            (Phase::Output, Phase::Output) => {}
+            (Phase::Output, _) => self.counted_from = computing(),
+            (_, Phase::Output) => self.computed += computing().saturating_sub(self.counted_from),
+            _ => {}
+        }
         std::mem::replace(&mut self.phase, phase)
+    }
+
+    /// Processor time spent between outputs on anything but calls of MPI.
+    pub fn computed(&self) -> Duration {
+        match self.phase {
+            Phase::Output => self.computed,
+            _ => self.computed + computing().saturating_sub(self.counted_from),
+        }
     }
 
     /// Time since the start, and what each phase had of it, in the order of [`Phase::ALL`].
@@ -102,7 +132,7 @@ impl Stopwatch {
 pub fn columns() -> String {
     let before = ["step [1]", "steps [1]", "particle_steps [1]", "ranks [1]", "loop [s]"].map(str::to_owned);
     let phases = Phase::ALL.map(|phase| format!("{} [s]", phase.name()));
-    let after = ["memory_largest [B]", "memory_sum [B]", "neighbours [1]"].map(str::to_owned);
+    let after = ["memory_largest [B]", "memory_sum [B]", "neighbours [1]", "computed [s]"].map(str::to_owned);
     [&before[..], &phases, &after].concat().join(",")
 }
 
@@ -129,13 +159,13 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         let memory = peak_memory();
         let mut sums: Vec<u64> = std::iter::once(whole).chain(spent).map(|time| time.as_nanos() as u64).collect();
         let (found, looked) = self.sampled_neighbours();
-        sums.extend([memory, found, looked]);
+        sums.extend([memory, found, looked, self.watch.computed().as_nanos() as u64]);
         self.comm.sum(&mut sums);
         let mut largest = [memory as f64];
         self.comm.max(&mut largest);
 
         let (times, others) = sums.split_at(1 + Phase::ALL.len());
-        let &[memory, found, looked] = others else { unreachable!("three were added") };
+        let &[memory, found, looked, computed] = others else { unreachable!("four were added") };
         let ranks = self.comm.size() as u64;
         let seconds = times.iter().map(|&time| format!("{:.6}", time as f64 * 1e-9 / ranks as f64));
         let (step, steps) = (self.clock.step, self.clock.step - first);
@@ -143,6 +173,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         cells.extend(seconds);
         cells.extend([largest[0] as u64, memory].map(|bytes| bytes.to_string()));
         cells.push(format!("{:.2}", found as f64 / looked.max(1) as f64));
+        cells.push(format!("{:.6}", computed as f64 * 1e-9));
         cells.join(",")
     }
 

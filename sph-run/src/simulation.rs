@@ -24,7 +24,7 @@ use formats::scene::{Scene, WallLattice};
 
 /// Skin of the neighbour lists over the smoothing length: lists serve until a particle moved half of it. Thicker lists take
 /// longer to go through and more memory, so it grows only where the thin ones would not serve for [`SERVE`] steps.
-const SKIN: f64 = 0.3;
+pub const SKIN: f64 = 0.3;
 const THICKEST: f64 = 0.6;
 const SERVE: f64 = 16.0;
 
@@ -196,8 +196,8 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         if shifted[0] > 0 {
             let owned = &self.particles.x[..self.particles.owned];
             let axes: Vec<usize> = (0..3).filter(|&a| P::Space::axis(a).is_some()).collect();
-            self.partition.tree = Tree::build(owned.iter().map(|&x| P::Space::to_disk(x)), None, &axes, self.comm)
-                .with_periods(self.partition.tree.periodic);
+            let places = owned.iter().map(|&x| P::Space::to_disk(x));
+            self.partition.tree = self.partition.tree.rebuilt(places, None, &axes, self.comm);
             self.partition.planned = None;
         }
         self.settle();

@@ -12,8 +12,12 @@ mod mu_i;
 mod operators;
 mod orb;
 mod phases;
+mod plan;
 mod resolution;
 mod stabilisers;
 mod stepping;
 mod support;
 mod visco_plastic;
+
+#[global_allocator]
+static ALLOCATOR: support::memory::Counting = support::memory::Counting;

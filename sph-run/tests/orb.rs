@@ -1,5 +1,6 @@
 //! Orthogonal recursive bisection and the ways between ranks: section H of the list of verification tests.
 
+use crate::support::memory;
 use sph_run::parallel::{Bounds, Reduce, Tree, any_changed, changed, route};
 use std::cell::Cell;
 use std::sync::{Barrier, Mutex};
@@ -196,7 +197,7 @@ fn h1_boxes_are_disjoint_and_cover_space() {
                     None => {
                         assert_eq!(node.ranks, 1);
                         assert!(depth == deepest || depth + 1 == deepest, "{name}: leaf at {depth} of {deepest}");
-                        assert_eq!(*tree.leaf(node.first), node.bounds);
+                        assert_eq!(tree.leaf(node.first), node.bounds);
                         seen[node.first] += 1;
                     }
                 }
@@ -320,7 +321,7 @@ fn neighbours_touch() {
             let adjacency = tree.adjacency();
             for a in 0..size {
                 let touching = |w: f64| -> Vec<usize> {
-                    (0..size).filter(|&b| b != a && tree.leaf(a).grown(w).touches(tree.leaf(b))).collect()
+                    (0..size).filter(|&b| b != a && tree.leaf(a).grown(w).touches(&tree.leaf(b))).collect()
                 };
                 assert_eq!(adjacency[a], touching(0.0), "{name}, {size} ranks");
                 assert_eq!(tree.within(a, 2.4 * DX), touching(2.4 * DX));
@@ -404,6 +405,64 @@ fn h6_trigger_and_balance() {
         assert!(size == 1 || any_changed(&counts(&tree, &before), &counts(&tree, &after)));
         tree = built(&after, &[0, 1, 2], size);
         assert!(ratio(&tree, &after) < 1.1, "deposit, {size} ranks: {}", ratio(&tree, &after));
+    }
+}
+
+/// While a column spreads, its pieces stay where they are cut; only what has become half as long again the other way is
+/// cut across another axis. (Anew each time, single columns more or less turn the cuts of whole regions.)
+#[test]
+fn axes_are_kept_while_the_material_moves() {
+    let axes = |tree: &Tree| tree.nodes().iter().map(|node| node.cut.map(|cut| cut.axis)).collect::<Vec<_>>();
+    let stretched =
+        |by: f64| -> Vec<Point> { jittered(cylinder()).into_iter().map(|[x, y, z]| [x * by, y, z / by]).collect() };
+    let moved = |before: &Tree, after: &Tree, points: &[Point]| {
+        points.iter().filter(|&&x| before.owner(x) != after.owner(x)).count() as f64 / points.len() as f64
+    };
+    for size in [2, 5, 7, 13, 64] {
+        let (mut kept, mut anew) = (built(&stretched(1.0), &[0, 1, 2], size), built(&stretched(1.0), &[0, 1, 2], size));
+        let (mut sent, mut sent_anew, first) = (0.0, 0.0, axes(&kept));
+        for step in 1..=6 {
+            let points = stretched(1.0 + 0.03 * f64::from(step));
+            let next = kept.rebuilt(points.iter().copied(), None, &[0, 1, 2], &AllOnOne::new(size));
+            let next_anew = built(&points, &[0, 1, 2], size);
+            assert_eq!(axes(&next), first, "{size} ranks, step {step}");
+            let most = *counts(&next, &points).iter().max().unwrap() as f64 * size as f64 / points.len() as f64;
+            assert!(most < 1.1, "{size} ranks, step {step}: {most}");
+            sent += moved(&kept, &next, &points);
+            sent_anew += moved(&anew, &next_anew, &points);
+            (kept, anew) = (next, next_anew);
+        }
+        assert!(sent <= sent_anew, "{size} ranks: {sent} of the particles change owner, {sent_anew} with axes anew");
+        // Flat as a pancake: no axis is kept that would cut it into needles.
+        let flat: Vec<Point> = stretched(1.0).into_iter().map(|[x, y, z]| [x, y, 0.01 * z]).collect();
+        let tall: Vec<Point> = flat.iter().map(|&[x, y, z]| [z, y, x]).collect();
+        let turned =
+            built(&flat, &[0, 1, 2], size).rebuilt(tall.iter().copied(), None, &[0, 1, 2], &AllOnOne::new(size));
+        assert!(turned.nodes().iter().filter_map(|node| node.cut).all(|cut| cut.axis != 0), "{size} ranks");
+        // Of another number of ranks nothing is kept.
+        let other = kept.rebuilt(flat.iter().copied(), None, &[0, 1, 2], &AllOnOne::new(size + 1));
+        assert_eq!(other, built(&flat, &[0, 1, 2], size + 1));
+    }
+}
+
+/// The memory that a rank needs for the scheme itself, whatever it owns: what is stated is what is taken.
+#[test]
+fn the_scheme_takes_less_than_a_mebibyte_on_4096_ranks() {
+    let points: Vec<Point> = (0..64).map(|n| random_point(n, 1.0)).collect();
+    for ranks in [5, 700, 4096] {
+        let comm = AllOnOne::new(ranks);
+        let (taken, tree) = memory::most(|| Tree::build(points.iter().copied(), None, &[0, 1, 2], &comm));
+        // What the reductions of MPI copy comes on top.
+        let (copied, stated) = (comm.largest_message.get(), Tree::bytes_to_build(ranks));
+        assert!(taken + copied <= stated, "{ranks} ranks: {taken} and {copied} of {stated}");
+        assert!(
+            2 * (taken + copied) + 100_000 > stated,
+            "{ranks} ranks: {stated} is not what {taken} and {copied} are"
+        );
+        let (home, _) = memory::most(|| route::next_hop(&tree, ranks / 2));
+        assert!(home < 300_000, "{ranks} ranks: {home}");
+        // The tree before, the new one and all it takes meanwhile.
+        assert!(tree.bytes() + stated < 1 << 20, "{ranks} ranks: {} and {stated}", tree.bytes());
     }
 }
 

@@ -335,6 +335,15 @@ fn command_lines_of_the_run_with_a_fault() {
         &["run", "--instructions", "avx"],
         &["run", "--checkpoint-every", "0s"],
         &["run", "--checkpoint-every", "5 parsecs"],
+        &["run", "--ranks", "4"],
+        &["run", "--plan", "--ranks", "0"],
+        &["run", "--plan", "--ranks", "4,many"],
+        &["run", "--plan", "--cost", "-1"],
+        &["run", "--plan", "--bandwidth", "0"],
+        &["run", "--plan", "--overlap", "1.5"],
+        &["run", "--plan", "--new"],
+        &["run", "--plan", "--state", "deposit"],
+        &["run", "--plan", "--ranks", "65536"],
     ];
     for arguments in cases {
         refused_at(&work, "sph-run", arguments, exit::USAGE, "error: ", "");

@@ -7,9 +7,14 @@ use tests::{TIME_LIMIT, WorkFolder, program, run_within, workflows};
 
 /// `./talus bench`, with the programs of these tests.
 fn bench(work: &Path, words: &[&str]) -> Command {
+    command(&[&["bench"], words].concat(), work)
+}
+
+/// `./talus` and these words, with the programs of these tests.
+fn command(words: &[&str], work: &Path) -> Command {
     let programs = program("sph-run").parent().unwrap().to_path_buf();
     let mut command = Command::new(workflows());
-    command.arg("bench").args(words).arg("--programs").arg(programs).arg("--out").arg(work);
+    command.args(words).arg("--programs").arg(programs).arg("--out").arg(work);
     for name in ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMPI_MCA_rmaps_base_oversubscribe"] {
         command.env(name, "1");
     }
@@ -52,4 +57,26 @@ fn instructions_name_the_tool_that_is_missing() {
     let mut command = bench(work.path(), &["instructions"]);
     let output = run_within(TIME_LIMIT, command.env("PATH", work.path())).expect(exit::NO_INPUT);
     assert!(output.stderr.contains("valgrind") && output.stderr.contains("apt-get install"), "{output}");
+}
+
+/// `./talus scaling`: real runs on 1 and 2 ranks, plans and migrations, all small.
+#[test]
+fn scaling_writes_a_page() {
+    let work = WorkFolder::new();
+    let mut scaling = command(&["scaling", "--quick"], work.path());
+    let output = run_within(TIME_LIMIT, &mut scaling).expect(exit::DONE);
+    assert!(output.stdout.trim().ends_with("scaling.md"), "{output}");
+    let text = std::fs::read_to_string(work.join("scaling.md")).unwrap();
+    let row =
+        |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_else(|| panic!("{start}: {text}"));
+    assert!(row("| 2 | 1728 |").contains("the same bits"), "{text}");
+    assert!(row("| deposit |").contains("| hold |") && !text.contains("NaN"), "{text}");
+    // Counted on 16 ranks, really gone on 2.
+    assert!(row("| 16 | 20").contains("| - |") && !row("| 2 | 20").contains("| - |"), "{text}");
+    for picture in ["scaling-weak.svg", "scaling-strong.svg"] {
+        assert!(text.contains(picture) && std::fs::read_to_string(work.join(picture)).unwrap().starts_with("<svg"));
+    }
+    let words = ["--programs", "nowhere", "--ranks", "0"];
+    let refused = run_within(TIME_LIMIT, Command::new(workflows()).arg("scaling").args(words)).expect(exit::USAGE);
+    assert!(refused.stderr.contains("--ranks"), "{refused}");
 }

@@ -8,6 +8,7 @@ mod faults;
 mod gate;
 mod launch;
 mod paths;
+mod scaling;
 mod stage;
 mod status;
 mod study;
@@ -83,6 +84,12 @@ enum Command {
         #[command(subcommand)]
         bench: bench::Bench,
     },
+    /// Scale as Yang et al. 2020 do: what many ranks take beyond one, measured here, and what 1024 would reach, predicted
+    /// from the partition; writes tests/bench/scaling.md.
+    Scaling {
+        #[command(flatten)]
+        options: scaling::Options,
+    },
     /// Kill, starve and damage small runs some thousand times, and see whether any work is lost; writes
     /// tests/faults/REPORT.md. Takes about an hour.
     Faults {
@@ -137,6 +144,7 @@ fn carry_out(command: Command) -> Result<(), Failure> {
         Command::Study { name: None, .. } => study::list(),
         Command::Study { name: Some(name), options } => study::carry_out(&name, &options),
         Command::Bench { bench } => bench::carry_out(&bench),
+        Command::Scaling { options } => scaling::carry_out(&options),
         Command::Faults { options } => faults::carry_out(&options),
         Command::Test { arguments } => gate::test(&arguments),
         Command::Help => {

@@ -1,5 +1,6 @@
 //! The little that cutting the domain needs of a group of ranks.
 
+use super::processor::waiting;
 use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives, Equivalence};
@@ -55,6 +56,6 @@ impl Reduce for SimpleCommunicator {
 
 fn in_place<T: Copy + Equivalence>(comm: &SimpleCommunicator, values: &mut [T], operation: SystemOperation) {
     if Communicator::size(comm) > 1 {
-        comm.all_reduce_into(&values.to_vec()[..], values, operation);
+        waiting(|| comm.all_reduce_into(&values.to_vec()[..], values, operation));
     }
 }

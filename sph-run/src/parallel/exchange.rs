@@ -1,5 +1,6 @@
 //! Messages between neighbouring ranks: counts first, then payloads, none of them blocking.
 
+use super::processor::waiting;
 use formats::h5::Communicator;
 use mpi::request::{self, Request, Scope};
 use mpi::traits::{Communicator as _, *};
@@ -18,8 +19,10 @@ pub fn exchange(comm: &Communicator, peers: &[usize], outgoing: &[Vec<u64>]) -> 
             .zip(&counts)
             .map(|(&p, count)| comm.process_at_rank(p as i32).immediate_send(scope, count))
             .collect();
-        wait_all(requests);
-        wait_all(sends);
+        waiting(|| {
+            wait_all(requests);
+            wait_all(sends);
+        });
     });
     let mut incoming: Vec<Vec<u64>> = incoming_counts.iter().map(|&count| vec![0; count as usize]).collect();
     let (outgoing, incoming_parts): (Vec<&[u64]>, Vec<&mut [u64]>) =
@@ -46,8 +49,10 @@ pub fn payloads(
             sends.push(comm.process_at_rank(peer as i32).immediate_send(scope, *message));
         }
         meanwhile();
-        wait_all(receives);
-        wait_all(sends);
+        waiting(|| {
+            wait_all(receives);
+            wait_all(sends);
+        });
     });
 }
 

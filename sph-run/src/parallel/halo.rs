@@ -6,6 +6,7 @@ use crate::algebra::Vector;
 use crate::boundary::field::{Field, Spread, Words};
 use crate::neighbors::bounds;
 use crate::parallel::exchange::{exchange, payloads};
+use crate::parallel::processor::waiting;
 use crate::particles::Particles;
 use formats::h5::Communicator;
 use mpi::traits::{Communicator as _, *};
@@ -28,7 +29,7 @@ pub struct Halo<const D: usize> {
 
 /// A copy of an owned particle.
 #[derive(Clone, Copy, Debug)]
-struct Copied {
+pub struct Copied {
     source: u32,
     /// Which of the shifts it is moved by.
     shift: u32,
@@ -75,30 +76,11 @@ impl<const D: usize> Halo<D> {
         let boxes = gather_boxes(comm, x);
         let me = comm.rank() as usize;
         let mut halo = Self { shifts, ..Self::default() };
-        let Some(mine) = boxes[me] else {
+        if boxes[me].is_none() {
             return halo;
-        };
+        }
         let by_reach: Vec<f64> = x.iter().map(|&x| reach(x)).collect();
-        for (rank, bounds) in boxes.iter().enumerate() {
-            let Some(theirs) = *bounds else { continue };
-            // Asked both ways round, so that two ranks agree on being peers to the last bit.
-            let (to, from) = (
-                |&s: &Vector<D>| gap2(&shifted(&mine, s), &theirs),
-                |&s: &Vector<D>| gap2(&shifted(&theirs, s), &mine),
-            );
-            let others = usize::from(rank == me);
-            if !halo.shifts[others..].iter().any(|s| to(s).min(from(s)) < widest * widest) {
-                continue;
-            }
-            let mut copies = Vec::new();
-            for (number, &shift) in halo.shifts.iter().enumerate().skip(others) {
-                let near = |&i: &u32| {
-                    let (x, reach) = (x[i as usize] + shift, by_reach[i as usize]);
-                    gap2(&(x, x), &theirs) < reach * reach
-                };
-                let near = (0..x.len() as u32).filter(near);
-                copies.extend(near.map(|source| Copied { source, shift: number as u32 }));
-            }
+        for (rank, copies) in copies_for(me, &boxes, x, &by_reach, &halo.shifts, widest) {
             halo.peers.push(rank);
             halo.send.push(copies);
         }
@@ -250,6 +232,38 @@ impl<const D: usize> Halo<D> {
     }
 }
 
+/// The peers of rank `me`, ascending, and what each gets of its particles `x`: those within `by_reach` of the box around
+/// the peer's own. `boxes`: of all ranks; the others as for [`Halo::plan`].
+pub fn copies_for<'a, const D: usize>(
+    me: usize,
+    boxes: &'a [Option<Box<D>>],
+    x: &'a [Vector<D>],
+    by_reach: &'a [f64],
+    shifts: &'a [Vector<D>],
+    widest: f64,
+) -> impl Iterator<Item = (usize, Vec<Copied>)> + 'a {
+    boxes.iter().enumerate().filter_map(move |(rank, bounds)| {
+        let (mine, theirs) = (boxes[me]?, (*bounds)?);
+        // Asked both ways round, so that two ranks agree on being peers to the last bit.
+        let (to, from) =
+            (|&s: &Vector<D>| gap2(&shifted(&mine, s), &theirs), |&s: &Vector<D>| gap2(&shifted(&theirs, s), &mine));
+        let others = usize::from(rank == me);
+        if !shifts[others..].iter().any(|s| to(s).min(from(s)) < widest * widest) {
+            return None;
+        }
+        let mut copies = Vec::new();
+        for (number, &shift) in shifts.iter().enumerate().skip(others) {
+            let near = |&i: &u32| {
+                let (x, reach) = (x[i as usize] + shift, by_reach[i as usize]);
+                gap2(&(x, x), &theirs) < reach * reach
+            };
+            let near = (0..x.len() as u32).filter(near);
+            copies.extend(near.map(|source| Copied { source, shift: number as u32 }));
+        }
+        Some((rank, copies))
+    })
+}
+
 /// Words a particle has of a field.
 fn count<const D: usize, const N: usize>(field: &Field<'_, D, N>) -> usize {
     match field {
@@ -259,7 +273,8 @@ fn count<const D: usize, const N: usize>(field: &Field<'_, D, N>) -> usize {
     }
 }
 
-type Box<const D: usize> = (Vector<D>, Vector<D>);
+/// Lower and upper corner.
+pub type Box<const D: usize> = (Vector<D>, Vector<D>);
 
 /// The box around every rank's owned particles; none for a rank without particles.
 fn gather_boxes<const D: usize>(comm: &Communicator, x: &[Vector<D>]) -> Vec<Option<Box<D>>> {
@@ -267,7 +282,7 @@ fn gather_boxes<const D: usize>(comm: &Communicator, x: &[Vector<D>]) -> Vec<Opt
     let mut mine = vec![if x.is_empty() { 0.0 } else { 1.0 }];
     mine.extend(low.0.iter().chain(&high.0));
     let mut all = vec![0.0; mine.len() * comm.size() as usize];
-    comm.all_gather_into(&mine[..], &mut all[..]);
+    waiting(|| comm.all_gather_into(&mine[..], &mut all[..]));
     let corner = |part: &[f64]| Vector(std::array::from_fn(|a| part[a]));
     all.chunks_exact(1 + 2 * D).map(|b| (b[0] > 0.0).then(|| (corner(&b[1..]), corner(&b[1 + D..])))).collect()
 }

@@ -7,6 +7,7 @@ pub mod gather;
 pub mod halo;
 pub mod migrate;
 pub mod orb;
+pub mod processor;
 pub mod route;
 
 pub use comm::{Reduce, Serial};

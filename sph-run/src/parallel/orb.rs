@@ -8,13 +8,16 @@
 
 use super::Reduce;
 
-/// Bits of a histogram's bin number.
-const BITS: u32 = 8;
+/// Bits of a histogram's bin number. Few: what travels through a build grows as 2^BITS/BITS, 5 MB at 4096 ranks.
+const BITS: u32 = 4;
 const BINS: usize = 1 << BITS;
 /// Refinements of a histogram: positions are told apart to 2^-(BITS PASSES) of the node's extent.
-const PASSES: u32 = 5;
-/// Nodes treated at once: 192 KiB of histograms.
-const CHUNK: usize = 96;
+const PASSES: u32 = 10;
+/// Nodes treated at once: 64 KiB of histograms.
+const CHUNK: usize = 512;
+/// A node cut before is cut across the same axis again unless its points are so many times longer along another: what
+/// turns its cuts sends nearly everything elsewhere.
+const KEEP: f64 = 1.5;
 const NOT_HERE: u32 = u32::MAX;
 
 /// An axis-parallel box: `low <= x < high`. Its faces may lie at infinity; a box with `low == high` holds nothing.
@@ -77,13 +80,34 @@ impl Node {
     }
 }
 
-/// The 2p - 1 boxes of p ranks, the same on every rank.
+/// The 2p - 1 boxes of p ranks, the same on every rank. In 24 bytes a node: boxes follow from the cuts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tree {
-    nodes: Vec<Node>,
-    leaves: Vec<usize>,
+    /// Level by level.
+    nodes: Vec<Stored>,
     /// Axes whose two ends at infinity are the same place.
     pub periodic: [bool; 3],
+}
+
+/// What is kept of a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stored {
+    first: u32,
+    ranks: u32,
+    /// The plane it is cut along; of a leaf these mean nothing.
+    axis: u32,
+    left: u32,
+    at: f64,
+}
+
+impl Stored {
+    fn leaf(first: u32, ranks: u32) -> Self {
+        Self { first, ranks, axis: 0, left: 0, at: 0.0 }
+    }
+
+    fn cut(&self) -> Option<Cut> {
+        (self.left > 0).then_some(Cut { axis: self.axis as usize, at: self.at, left: self.left as usize })
+    }
 }
 
 impl Tree {
@@ -100,13 +124,36 @@ impl Tree {
     where
         P: Iterator<Item = [f64; 3]> + Clone,
     {
-        let root = Node { bounds: Bounds::EVERYWHERE, first: 0, ranks: comm.size(), cut: None };
-        let mut nodes = vec![root];
+        Self::build_after(None, points, weights, axes, comm)
+    }
+
+    /// [`Tree::build`] where the points have moved: a node keeps the axis it was cut across, as Yang et al. do, unless
+    /// its points are now half as long again along another. Most points then stay where they are. Collective.
+    pub fn rebuilt<P>(&self, points: P, weights: Option<&[u64]>, axes: &[usize], comm: &impl Reduce) -> Self
+    where
+        P: Iterator<Item = [f64; 3]> + Clone,
+    {
+        let before = (self.size() == comm.size()).then_some(self);
+        Self { periodic: self.periodic, ..Self::build_after(before, points, weights, axes, comm) }
+    }
+
+    fn build_after<P>(
+        before: Option<&Self>,
+        points: P,
+        weights: Option<&[u64]>,
+        axes: &[usize],
+        comm: &impl Reduce,
+    ) -> Self
+    where
+        P: Iterator<Item = [f64; 3]> + Clone,
+    {
+        let mut tree = Self { nodes: Vec::with_capacity(2 * comm.size() - 1), periodic: [false; 3] };
+        tree.nodes.push(Stored::leaf(0, comm.size() as u32));
         let mut place = vec![0u32; points.clone().count()];
         let weight = |i: usize| weights.map_or(1, |w| w[i]);
         let mut level = 0..1;
         while !level.is_empty() {
-            let parents: Vec<usize> = level.clone().filter(|&k| nodes[k].ranks > 1).collect();
+            let parents: Vec<usize> = level.clone().filter(|&k| tree.nodes[k].ranks > 1).collect();
             for chunk in parents.chunks(CHUNK) {
                 // Position in the chunk of every node of the level.
                 let mut slot = vec![NOT_HERE; level.len()];
@@ -117,33 +164,27 @@ impl Tree {
                     let s = *slot.get((k as usize).wrapping_sub(level.start))?;
                     (s != NOT_HERE).then(|| Member { slot: s as usize, x, weight: weight(i) })
                 });
-                let planes = planes(&nodes, chunk, members, axes, comm);
+                // The shape of a tree follows from the number of ranks: a node has the same number in both.
+                let kept = |k: usize| before.and_then(|tree| tree.nodes[k].cut()).map(|cut| cut.axis);
+                let planes = planes(&tree, chunk, members, axes, kept, comm);
                 for (&k, (axis, at)) in chunk.iter().zip(planes) {
-                    let left = nodes.len();
-                    let parent = &mut nodes[k];
-                    parent.cut = Some(Cut { axis, at, left });
-                    let (parent, share) = (*parent, parent.left_ranks());
-                    let mut lower = Node { ranks: share, cut: None, ..parent };
-                    let mut upper =
-                        Node { first: parent.first + share, ranks: parent.ranks - share, cut: None, ..parent };
-                    lower.bounds.high[axis] = at;
-                    upper.bounds.low[axis] = at;
-                    nodes.extend([lower, upper]);
+                    let left = tree.nodes.len() as u32;
+                    let parent = &mut tree.nodes[k];
+                    *parent = Stored { axis: axis as u32, left, at, ..*parent };
+                    let (parent, share) = (*parent, parent.ranks.div_ceil(2));
+                    tree.nodes.push(Stored::leaf(parent.first, share));
+                    tree.nodes.push(Stored::leaf(parent.first + share, parent.ranks - share));
                 }
             }
             for (x, k) in points.clone().zip(&mut place) {
                 // Points on leaves stay where they are.
-                if let Some(cut) = nodes[*k as usize].cut {
+                if let Some(cut) = tree.nodes[*k as usize].cut() {
                     *k = child(&cut, x) as u32;
                 }
             }
-            level = level.end..nodes.len();
+            level = level.end..tree.nodes.len();
         }
-        let mut leaves = vec![0; comm.size()];
-        for (k, node) in nodes.iter().enumerate().filter(|(_, node)| node.cut.is_none()) {
-            leaves[node.first] = k;
-        }
-        Self { nodes, leaves, periodic: [false; 3] }
+        tree
     }
 
     /// The same boxes where some axes are periodic: those at both ends are neighbours.
@@ -153,26 +194,81 @@ impl Tree {
 
     /// Number of ranks.
     pub fn size(&self) -> usize {
-        self.leaves.len()
+        self.nodes[0].ranks as usize
     }
 
     /// All nodes, level by level.
-    pub fn nodes(&self) -> &[Node] {
-        &self.nodes
+    pub fn nodes(&self) -> Vec<Node> {
+        let node = |stored: &Stored| Node {
+            bounds: Bounds::EVERYWHERE,
+            first: stored.first as usize,
+            ranks: stored.ranks as usize,
+            cut: stored.cut(),
+        };
+        let mut nodes: Vec<Node> = self.nodes.iter().map(node).collect();
+        for k in 0..nodes.len() {
+            let Node { bounds, cut: Some(Cut { axis, at, left }), .. } = nodes[k] else { continue };
+            nodes[left].bounds = bounds;
+            nodes[left + 1].bounds = bounds;
+            nodes[left].bounds.high[axis] = at;
+            nodes[left + 1].bounds.low[axis] = at;
+        }
+        nodes
+    }
+
+    /// Levels below the root.
+    pub fn levels(&self) -> usize {
+        let (mut levels, mut k) = (0, 0);
+        // No way is longer than that to the lowest ranks.
+        while let Some(cut) = self.nodes[k].cut() {
+            (levels, k) = (levels + 1, cut.left);
+        }
+        levels
+    }
+
+    /// The memory it takes, bytes.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>() + self.nodes.capacity() * size_of::<Stored>()
+    }
+
+    /// The most memory that [`Tree::build`] takes for so many ranks, the new tree included, bytes: beside what it keeps of each
+    /// point, and beside what the reductions copy, which is at most 64 KiB.
+    pub fn bytes_to_build(ranks: usize) -> usize {
+        let chunk = CHUNK.min(ranks);
+        let of_chunk = size_of::<Search>() + (BINS + 1) * size_of::<u64>() + 8 * size_of::<f64>() + 32;
+        // Of a level: its parents and their positions in the chunk.
+        let of_level = size_of::<usize>() + 2 * size_of::<u32>();
+        2 * ranks * size_of::<Stored>() + chunk * of_chunk + ranks * of_level + 64 * 1024
     }
 
     /// The rank whose box holds the point; unique.
     pub fn owner(&self, x: [f64; 3]) -> usize {
         let mut node = &self.nodes[0];
-        while let Some(cut) = &node.cut {
-            node = &self.nodes[child(cut, x)];
+        while let Some(cut) = node.cut() {
+            node = &self.nodes[child(&cut, x)];
         }
-        node.first
+        node.first as usize
     }
 
     /// The box of a rank.
-    pub fn leaf(&self, rank: usize) -> &Bounds {
-        &self.nodes[self.leaves[rank]].bounds
+    pub fn leaf(&self, rank: usize) -> Bounds {
+        self.bounds(rank, 1)
+    }
+
+    /// The box of the node with these ranks.
+    fn bounds(&self, first: usize, ranks: usize) -> Bounds {
+        let (mut bounds, mut node) = (Bounds::EVERYWHERE, &self.nodes[0]);
+        while node.ranks as usize > ranks {
+            let Some(Cut { axis, at, left }) = node.cut() else { break };
+            if first < self.nodes[left + 1].first as usize {
+                bounds.high[axis] = at;
+                node = &self.nodes[left];
+            } else {
+                bounds.low[axis] = at;
+                node = &self.nodes[left + 1];
+            }
+        }
+        bounds
     }
 
     /// The ranks whose closed boxes touch `bounds`, ascending.
@@ -180,11 +276,15 @@ impl Tree {
         let (mut found, mut open) = (Vec::new(), vec![0]);
         while let Some(k) = open.pop() {
             let node = &self.nodes[k];
-            if node.bounds.touches(bounds) {
-                match &node.cut {
-                    Some(cut) => open.extend([cut.left + 1, cut.left]),
-                    None => found.push(node.first),
-                }
+            let Some(Cut { axis, at, left }) = node.cut() else {
+                found.push(node.first as usize);
+                continue;
+            };
+            if at <= bounds.high[axis] {
+                open.push(left + 1);
+            }
+            if bounds.low[axis] <= at {
+                open.push(left);
             }
         }
         found
@@ -193,7 +293,7 @@ impl Tree {
     /// The ranks whose closed boxes touch that of `rank`, also across the ends of periodic axes, ascending, without
     /// itself.
     pub fn neighbours(&self, rank: usize) -> Vec<usize> {
-        let mut places = vec![*self.leaf(rank)];
+        let mut places = vec![self.leaf(rank)];
         for axis in (0..3).filter(|&axis| self.periodic[axis]) {
             for place in places.clone() {
                 for (end, other) in [(place.low[axis], f64::INFINITY), (place.high[axis], f64::NEG_INFINITY)] {
@@ -287,12 +387,13 @@ impl Search {
     }
 }
 
-/// Axis and place of the cuts through `chunk`, in its order.
+/// Axis and place of the cuts through `chunk`, in its order. `kept`: the axis a node was cut across before.
 fn planes(
-    nodes: &[Node],
+    tree: &Tree,
     chunk: &[usize],
     members: impl Iterator<Item = Member> + Clone,
     axes: &[usize],
+    kept: impl Fn(usize) -> Option<usize>,
     comm: &impl Reduce,
 ) -> Vec<(usize, f64)> {
     // Weights and tight boxes; maxima travel as minima of the negative.
@@ -314,14 +415,15 @@ fn planes(
             let extent = &extents[6 * s..][..6];
             let length = |a: usize| -extent[3 + a] - extent[a];
             let longest = |best: usize, &a: &usize| if length(a) > length(best) { a } else { best };
-            let axis = axes.iter().fold(axes[0], longest);
+            let best = axes.iter().fold(axes[0], longest);
+            let axis = kept(chunk[s]).filter(|&axis| KEEP * length(axis) >= length(best)).unwrap_or(best);
             let scale = (1u64 << (BITS * PASSES)) as f64 / length(axis);
-            let node = &nodes[chunk[s]];
+            let ranks = u64::from(tree.nodes[chunk[s]].ranks);
             Search {
                 axis,
                 low: extent[axis],
                 scale: if scale.is_finite() && scale > 0.0 { scale } else { 0.0 },
-                share: (node.left_ranks() as u64, node.ranks as u64, totals[s]),
+                share: (ranks.div_ceil(2), ranks, totals[s]),
                 prefix: 0,
                 below: 0,
                 threshold: (totals[s] == 0).then_some(0),
@@ -360,12 +462,17 @@ fn planes(
     }
     comm.min(&mut gaps);
     let places = searches.iter().zip(gaps.chunks(2)).zip(chunk);
-    places.map(|((search, gap), &k)| (search.axis, place(-gap[0], gap[1], search.axis, &nodes[k].bounds))).collect()
+    places
+        .map(|((search, gap), &k)| {
+            let bounds = || tree.bounds(tree.nodes[k].first as usize, tree.nodes[k].ranks as usize);
+            (search.axis, place(-gap[0], gap[1], search.axis, bounds))
+        })
+        .collect()
 }
 
 /// Place of a cut with the nearest points at `left` and `right`, infinite where a side has none: left < at <= right,
 /// and not outside `bounds`.
-fn place(left: f64, right: f64, axis: usize, bounds: &Bounds) -> f64 {
+fn place(left: f64, right: f64, axis: usize, bounds: impl Fn() -> Bounds) -> f64 {
     match (left.is_finite(), right.is_finite()) {
         (true, true) => {
             let middle = left + 0.5 * (right - left);
@@ -375,6 +482,7 @@ fn place(left: f64, right: f64, axis: usize, bounds: &Bounds) -> f64 {
         (false, true) => right,
         // An empty node: all of it to one side, or both halves of space.
         (false, false) => {
+            let bounds = bounds();
             [bounds.low[axis], bounds.high[axis]].into_iter().find(|face| face.is_finite()).unwrap_or(0.0)
         }
     }

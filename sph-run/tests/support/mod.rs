@@ -3,6 +3,8 @@
 // Each test program uses some of it.
 #![allow(dead_code)]
 
+pub mod memory;
+
 use formats::h5::Communicator;
 use sph_run::algebra::{Sym, Vector};
 use sph_run::lanes::{Element, Instructions, Parts};

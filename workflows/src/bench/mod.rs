@@ -3,8 +3,8 @@
 mod callgrind;
 mod checkpoint;
 mod instructions;
-mod launches;
-mod page;
+pub mod launches;
+pub mod page;
 mod peak;
 mod rows;
 mod speed;
@@ -49,12 +49,12 @@ pub fn carry_out(bench: &Bench) -> Result<(), Failure> {
 }
 
 /// Where the tables are kept.
-fn folder() -> PathBuf {
+pub fn folder() -> PathBuf {
     paths::repository().join("tests").join("bench")
 }
 
 /// The programs that are measured: built now, or those in a folder.
-fn programs(folder: Option<&Path>) -> Result<Programs, Failure> {
+pub fn programs(folder: Option<&Path>) -> Result<Programs, Failure> {
     match folder {
         Some(folder) => Programs::installed(&paths::from_caller(folder)),
         None => Programs::build(),
@@ -62,7 +62,7 @@ fn programs(folder: Option<&Path>) -> Result<Programs, Failure> {
 }
 
 /// Writes a page, with the folders on the way to it. Returns its path.
-fn write(page: &Path, text: &str) -> Result<PathBuf, Failure> {
+pub fn write(page: &Path, text: &str) -> Result<PathBuf, Failure> {
     let folder = page.parent().unwrap_or(page);
     std::fs::create_dir_all(folder).map_err(|e| Failure::cannot_write(format!("{}: {e}", folder.display())))?;
     disk::write_atomic(page, text.as_bytes()).map_err(|e| Failure::cannot_write(e.to_string()))?;
@@ -78,7 +78,7 @@ fn processor() -> String {
 
 /// Least, middle and largest of some numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Spread {
+pub struct Spread {
     least: f64,
     median: f64,
     largest: f64,

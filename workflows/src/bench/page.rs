@@ -24,10 +24,15 @@ pub struct Heading {
 impl Heading {
     /// Of a benchmark that begins now, by these words behind `./talus bench`.
     pub fn now(words: &str) -> Result<Self, Failure> {
+        Self::of(format!("./talus bench {words}"))
+    }
+
+    /// Of measurements that begin now, by this command.
+    pub fn of(command: String) -> Result<Self, Failure> {
         let sources = record::Sources::now()?;
         let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
         Ok(Self {
-            command: format!("./talus bench {words}"),
+            command,
             day: provenance::now()[..10].to_owned(),
             commit: sources.commit,
             changed: sources.changed,

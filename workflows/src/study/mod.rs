@@ -8,7 +8,7 @@ mod coverage;
 mod definition;
 mod expression;
 mod page;
-mod paper;
+pub mod paper;
 mod reference;
 mod results;
 mod table;

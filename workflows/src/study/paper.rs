@@ -93,14 +93,19 @@ impl Paper {
         );
     }
 
-    /// The drawing as PNG.
-    pub fn png(&self) -> Result<Vec<u8>, String> {
+    /// The drawing as SVG.
+    pub fn svg(&self) -> String {
         let [width, height] = self.size;
-        let svg = format!(
+        format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\">\n\
              <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n{}</svg>\n",
             self.body
-        );
+        )
+    }
+
+    /// The drawing as PNG.
+    pub fn png(&self) -> Result<Vec<u8>, String> {
+        let svg = self.svg();
         let mut options = usvg::Options { font_family: FAMILY.into(), ..usvg::Options::default() };
         let fonts = Arc::make_mut(&mut options.fontdb);
         fonts.load_font_data(FONT.to_vec());
