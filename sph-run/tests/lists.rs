@@ -79,6 +79,43 @@ impl Job for Run<'_> {
     }
 }
 
+/// The skin of the next lists over h, for steps in which particles go no further than `farthest` h.
+struct Skin<'a> {
+    scene: &'a Scene,
+    farthest: f64,
+}
+
+impl Job for Skin<'_> {
+    type Output = f64;
+    fn run<const D: usize, const N: usize, P: Physics<D, N>>(self, material: P::Material) -> f64 {
+        let (_turn, comm) = alone();
+        let nobody = Particles::<D, N>::default();
+        let mut run = Simulation::<D, N, P>::new(&comm, self.scene, material, nobody, 0, Clock::default());
+        run.choose_skin(self.farthest * run.parameters.h);
+        run.parameters.skin / run.parameters.h
+    }
+}
+
+/// Lists of a fast flow are thicker, so that they serve for some steps, but not where a period has no room for them.
+#[test]
+fn lists_are_thicker_in_fast_flow() {
+    let skin = |period: &str, farthest: f64| {
+        let text = format!(
+            "space = \"plane-strain\"\nspacing = 0.01\n{period}{}\n[body.block]\n\
+             box = {{ min = [0, 0, 0], max = [0.06, 0.06, 0.06] }}\n[end]\ntime = 1\n",
+            LAWS[0].split("[numerics]").next().unwrap()
+        );
+        let scene = Scene::read("scene", &text).unwrap_or_else(|error| panic!("{error}"));
+        resolve(&scene, Skin { scene: &scene, farthest })
+    };
+    let near = |got: f64, want: f64| assert!((got - want).abs() < 1e-12, "{got} {want}");
+    near(skin("", 0.0), 0.3);
+    // Half of it, 0.2 h, in 16 steps.
+    near(skin("", 0.0125), 0.4);
+    near(skin("", 1.0), 0.6);
+    near(skin("[periodic]\nx = { from = 0, to = 0.3 }\n", 1.0), 0.3);
+}
+
 #[test]
 fn lists_change_no_bit() {
     for space in ["plane-strain", "3d"] {
