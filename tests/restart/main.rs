@@ -1,6 +1,7 @@
 //! No work is ever lost: whatever happens to a run, the same command goes on, and ends with the same bits.
 
 mod batch;
+mod exchange;
 mod faults;
 mod generations;
 mod golden;

@@ -1,4 +1,4 @@
-//! A library for `LD_PRELOAD` that counts the system calls a program makes on files of one folder, and does something
+//! A library for `LD_PRELOAD` that counts the system calls a program makes on files of one folder, and its calls of MPI, and does something
 //! at one of them: end the program, tear a write, fail, flip a bit, wait. The program itself knows nothing of it.
 //! `tests::shim` says what is asked for, in environment variables; `plan.rs` reads them.
 //!
@@ -19,6 +19,7 @@ macro_rules! stand_for {
     };
     (@one $name:ident, ($($argument:ident: $type:ty),*) -> $result:ty, |$next:ident| $body:expr) => {
         #[unsafe(no_mangle)]
+        #[allow(non_snake_case, reason = "as the library has it")]
         unsafe extern "C" fn $name($($argument: $type),*) -> $result {
             static NEXT: OnceLock<usize> = OnceLock::new();
             let found = *NEXT.get_or_init(|| raw::behind(concat!(stringify!($name), "\0")));
@@ -107,6 +108,28 @@ stand_for!(mkdir, (path: *const c_char, mode: mode_t) -> c_int, |next| {
 stand_for!(mkdirat, (folder: c_int, path: *const c_char, mode: mode_t) -> c_int, |next| {
     plain(Kind::Folder, Place::Named(folder, path), minus_one, || next(folder, path, mode))
 });
+
+// Handles of MPI are pointers or numbers: what is handed on is the register.
+stand_for!(MPI_Isend, (buffer: *const c_void, count: c_int, of: size_t, to: c_int, tag: c_int, comm: size_t, request: *mut c_void) -> c_int, |next| {
+    message(Kind::Send, count, || next(buffer, count, of, to, tag, comm, request))
+});
+stand_for!(MPI_Allreduce, (mine: *const c_void, all: *mut c_void, count: c_int, of: size_t, how: size_t, comm: size_t) -> c_int, |next| {
+    message(Kind::Reduce, count, || next(mine, all, count, of, how, comm))
+});
+stand_for!(MPI_Allgather, (mine: *const c_void, count: c_int, of: size_t, all: *mut c_void, each: c_int, in_all: size_t, comm: size_t) -> c_int, |next| {
+    message(Kind::Gather, count, || next(mine, count, of, all, each, in_all, comm))
+});
+
+/// Exchange with other ranks.
+fn message(kind: Kind, count: c_int, call: impl Fn() -> c_int) -> c_int {
+    match judge(kind, Place::Ranks, usize::try_from(count).unwrap_or(0)) {
+        Verdict::EndAfter => {
+            call();
+            raw::kill()
+        }
+        _ => call(),
+    }
+}
 
 /// Calls without a buffer. `failed` returns an error code as the call would.
 fn plain(kind: Kind, place: Place, failed: impl Fn(c_int) -> c_int, call: impl Fn() -> c_int) -> c_int {

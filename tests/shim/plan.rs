@@ -6,8 +6,8 @@
 //! | `TALUS_FAULT_LOG` | file outside of it, to which a line is appended for what was done, or for each call |
 //! | `TALUS_FAULT_PROGRAM` | only in a program of this name; `sph-run` where it is not set |
 //! | `TALUS_FAULT_RANK` | only on this MPI rank (0 without MPI); on all where it is not set |
-//! | `TALUS_FAULT_CALLS` | names of [`Kind`], with commas; all that change something where it is not set |
-//! | `TALUS_FAULT_FILES` | only paths in the folder of this form: `?` stands for one letter, `*` for any number of them |
+//! | `TALUS_FAULT_CALLS` | names of [`Kind`], with commas; all that change something on the disk where it is not set |
+//! | `TALUS_FAULT_FILES` | only paths in the folder of this form: `?` stands for one letter, `*` for any number of them; calls of MPI have the path `messages` |
 //! | `TALUS_FAULT_AT` | the number of the call, from 1, counted in each process on its own |
 //! | `TALUS_FAULT_DO` | `count`, `kill`, `torn`, `short`, `flip`, `suspend`, `sleep:MS`, `slow:MS`, `clock:S`, `fail:CODE`, `fail-on:CODE`, `full:CODE` |
 //!
@@ -38,10 +38,16 @@ pub enum Kind {
     Remove,
     /// Makes a folder.
     Folder,
+    /// A message to another rank.
+    Send,
+    /// A reduction over all ranks.
+    Reduce,
+    /// A gathering from all ranks.
+    Gather,
 }
 
 impl Kind {
-    const ALL: [(&str, Self); 11] = [
+    const ALL: [(&str, Self); 14] = [
         ("open", Self::Open),
         ("read", Self::Read),
         ("create", Self::Create),
@@ -53,6 +59,9 @@ impl Kind {
         ("link", Self::Link),
         ("remove", Self::Remove),
         ("folder", Self::Folder),
+        ("send", Self::Send),
+        ("reduce", Self::Reduce),
+        ("gather", Self::Gather),
     ];
 
     fn name(self) -> &'static str {
@@ -99,6 +108,9 @@ struct Plan {
     words: String,
 }
 
+/// What stands for a path where ranks exchange.
+const MESSAGES: &str = "messages";
+
 static COUNTED: AtomicU64 = AtomicU64::new(0);
 static FAILING: AtomicBool = AtomicBool::new(false);
 /// Seconds that the time of day is off.
@@ -109,7 +121,7 @@ pub fn jumped() -> i64 {
     JUMPED.load(Ordering::SeqCst)
 }
 
-/// Counts a call and says what is to be done with it. `bytes`: how many it writes or reads.
+/// Counts a call and says what is to be done with it. `bytes`: how many it writes or reads, or the numbers in a message.
 pub fn judge(kind: Kind, place: Place, bytes: usize) -> Verdict {
     static PLAN: OnceLock<Option<Plan>> = OnceLock::new();
     let Some(plan) = PLAN.get_or_init(Plan::read) else { return Verdict::Go };
@@ -134,7 +146,7 @@ impl Plan {
         let rank = rank.map_or(Some(0), |rank| rank.parse().ok())?;
         let calls = variable("CALLS").unwrap_or_default();
         let wanted = |(name, kind): &(&str, Kind)| match calls.as_str() {
-            "" => !matches!(kind, Kind::Open | Kind::Read),
+            "" => !matches!(kind, Kind::Open | Kind::Read | Kind::Send | Kind::Reduce | Kind::Gather),
             calls => calls.split(',').any(|call| call == *name),
         };
         let words = variable("DO")?;
@@ -175,8 +187,11 @@ impl Plan {
     }
 
     fn judge(&self, kind: Kind, place: Place, bytes: usize) -> Option<Verdict> {
-        let path = place.path()?;
-        let path = path.strip_prefix(&self.folder)?;
+        let path = match place {
+            Place::Ranks => MESSAGES.to_owned(),
+            place => place.path()?.strip_prefix(&self.folder)?.to_owned(),
+        };
+        let path = path.as_str();
         if let Deed::Full(code) = self.deed {
             if matches!(kind, Kind::Write | Kind::Allocate) && raw::exists(&self.log) {
                 return Some(Verdict::Fail(code));

@@ -10,12 +10,15 @@ pub enum Place {
     Open(c_int),
     /// To a name, relative to an open folder or, with `AT_FDCWD`, to the current one.
     Named(c_int, *const c_char),
+    /// To other ranks.
+    Ranks,
 }
 
 impl Place {
     /// The path; `None` where it can't be told.
     pub fn path(self) -> Option<String> {
         let (folder, name) = match self {
+            Self::Ranks => return None,
             Self::Open(fd) => return link(&format!("/proc/self/fd/{fd}\0")),
             Self::Named(_, name) if name.is_null() => return None,
             Self::Named(folder, name) => (folder, name),

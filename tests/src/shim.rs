@@ -82,7 +82,7 @@ pub struct Call {
     pub number: u64,
     /// Its kind: see `tests/shim/plan.rs`.
     pub kind: String,
-    /// Bytes to write or read.
+    /// Bytes to write or read; numbers in a message.
     pub bytes: u64,
     /// Path within the folder; of two names the new one.
     pub path: String,
