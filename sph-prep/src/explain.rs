@@ -322,7 +322,7 @@ time = "0.4 s"
         };
         let mu = "[material.mu-i]\ndensity = 1500\nsound-speed = 20\nfriction-static = 0.38\nfriction-dynamic = 0.64\n\
                   inertial-number = 0.28\ngrain-diameter = 0.001\ngrain-density = 2500\n";
-        let told = with(mu);
+        let told = with(mu).split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(told.contains("mu(I) law") && told.contains("from 0.38 at rest to 0.64"), "{told}");
         assert!(told.contains("goes on creeping"), "{told}");
     }
