@@ -38,10 +38,10 @@ fn main() {
         Err(error) => Err(error),
     };
     if let Ok(Cli { check: true, run, .. }) = &cli {
-        std::process::exit(check::report(&RunFolder::new(run)));
+        once(|| check::report(&RunFolder::new(run)));
     }
     if let Ok(Cli { run, plan: options @ plan::Options { plan: true, .. }, .. }) = &cli {
-        std::process::exit(plan::report(run, options));
+        once(|| plan::report(run, options));
     }
     let patience = cli.as_ref().map_or(cli::MPI_PATIENCE, |cli| cli.mpi_patience);
     let starting = end_unless_started_within(patience);
@@ -66,6 +66,12 @@ fn main() {
     };
     drop(universe);
     std::process::exit(code);
+}
+
+/// Does what needs no MPI, and ends. Of the processes that mpirun started only the first does it.
+fn once(work: impl FnOnce() -> i32) -> ! {
+    let rank = ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"].iter().find_map(|name| std::env::var(name).ok());
+    std::process::exit(if rank.is_none_or(|rank| rank == "0") { work() } else { exit::DONE })
 }
 
 /// Ends this process where MPI does not come up until what is returned is dropped: a rank that is killed or stopped as it
