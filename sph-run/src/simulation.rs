@@ -20,13 +20,14 @@ use crate::space::Space;
 use crate::stabilize::{Buffers, Stabilisers};
 use crate::sweep::Pairs;
 use formats::h5::Communicator;
-use formats::scene::{Scene, WallLattice};
+use formats::scene::{FARTHEST, Scene, WallLattice};
 
 /// Skin of the neighbour lists over the smoothing length: lists serve until a particle moved half of it. Thicker lists take
 /// longer to go through and more memory, so it grows only where the thin ones would not serve for [`SERVE`] steps.
 pub const SKIN: f64 = 0.3;
 const THICKEST: f64 = 0.6;
 const SERVE: f64 = 16.0;
+const _: () = assert!(2.0 + THICKEST < FARTHEST, "sites behind a terrain are found less far");
 
 /// Fixed numbers of a run.
 #[derive(Clone, Copy, Debug)]

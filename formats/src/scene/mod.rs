@@ -27,7 +27,7 @@ pub use periodic_axis::PeriodicAxis;
 pub use release::{Depth, Release};
 pub use sources::Sources;
 pub use terrain::{Terrain, normal};
-pub use walls::{Parity, Site, WallLattice};
+pub use walls::{FARTHEST, Parity, Site, WallLattice};
 
 use crate::{kernel::Kernel, space::Space};
 

@@ -11,8 +11,8 @@ use super::{PeriodicAxis, Scene, Slip, Terrain, Wall, WallKind};
 use crate::space::Space;
 use std::sync::Arc;
 
-/// Lists of neighbours reach less far, in smoothing lengths.
-const FARTHEST: f64 = 2.5;
+/// Lists of neighbours reach less far, in smoothing lengths. Behind a terrain sites are found as far.
+pub const FARTHEST: f64 = 2.7;
 
 /// Lattice coordinates of a site; unused axes are zero.
 pub type Site = [i32; 3];
