@@ -128,7 +128,7 @@ fn links_lead_somewhere() {
         .collect();
     pages.retain(|page| page.is_file());
     assert!(pages.iter().any(|page| page.ends_with("README.md")));
-    for folder in ["docs", "workflows", "tests"] {
+    for folder in ["docs", "packaging", "workflows", "tests"] {
         let folder = root.join(folder);
         pages.extend(if folder.is_dir() { files(&folder, &["md"]) } else { Vec::new() });
     }
@@ -154,6 +154,28 @@ fn every_package_is_a_member_with_the_common_settings() {
             assert!(text.contains(line), "{package}/Cargo.toml: no `{line}`");
         }
     }
+}
+
+/// EasyBuild fetches the crates by itself and needs each of them, with the checksum of the lock file.
+#[test]
+fn the_easyconfig_has_the_crates_of_the_lock_file() {
+    let lock: toml::Table = std::fs::read_to_string(repository().join("Cargo.lock")).unwrap().parse().unwrap();
+    let easyconfigs = files(&repository().join("packaging/easybuild"), &["eb"]);
+    let [easyconfig] = easyconfigs.as_slice() else { panic!("{easyconfigs:?}") };
+    let text = std::fs::read_to_string(easyconfig).unwrap();
+    let listed: BTreeSet<&str> = text.lines().map(str::trim).filter(|line| line.contains(".tar.gz': '")).collect();
+    let mut locked = BTreeSet::new();
+    for package in lock["package"].as_array().unwrap() {
+        let [name, version] = ["name", "version"].map(|key| package[key].as_str().unwrap());
+        if let Some(checksum) = package.get("checksum") {
+            locked.insert(format!("{{'{name}-{version}.tar.gz': '{}'}},", checksum.as_str().unwrap()));
+            assert!(text.contains(&format!("    ('{name}', '{version}'),\n")), "{name} {version} is not in `crates`");
+        }
+    }
+    assert!(locked.len() > 100, "{}", locked.len());
+    let locked: BTreeSet<&str> = locked.iter().map(String::as_str).collect();
+    let other: Vec<_> = listed.symmetric_difference(&locked).collect();
+    assert!(other.is_empty(), "run `python3 packaging/easybuild/crates.py`; these differ: {other:?}");
 }
 
 /// Runs ./talus with a cargo that answers `--version` with a line and else says how it was called.
