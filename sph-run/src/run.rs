@@ -153,7 +153,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             // From here on the run is under way. Who computes is for people: not to be able to note it is no fault.
             let folder = self.job.folder;
             let _ = std::fs::remove_file(folder.to_continue());
-            let ranks = self.job.comm.size() as usize;
+            let ranks = self.job.comm.size();
             let _ = provenance::append(&folder.provenance(), Entry::this("sph-run", ranks));
             Ok(())
         })?;

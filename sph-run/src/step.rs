@@ -221,7 +221,15 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         for first in part.clone().step_by(PART) {
             look_after(self.comm);
             let some = first..(first + PART).min(part.end);
-            momentum::<D, N, P::Space, P::Kernel, F, T>(some, p, &self.neighbors, pairs, viscosity, stressed, a, heat);
+            momentum::<D, N, P::Space, P::Kernel, F, T>(
+                some,
+                p,
+                &self.neighbors,
+                pairs,
+                viscosity,
+                stressed,
+                (a, heat),
+            );
         }
     }
 

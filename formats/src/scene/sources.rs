@@ -20,8 +20,11 @@ const COPIES: &str = "rasters";
 #[derive(Debug)]
 pub struct Sources {
     place: Place,
-    taken: RefCell<Vec<(String, Result<Arc<[u8]>, String>)>>,
+    taken: RefCell<Vec<(String, Found)>>,
 }
+
+/// The bytes of a file; what the system says where there is none.
+type Found = Result<Arc<[u8]>, String>;
 
 #[derive(Debug)]
 enum Place {
@@ -43,7 +46,7 @@ impl Sources {
     }
 
     /// The bytes of a file; what the system says where there is none.
-    pub(super) fn get(&self, path: &str) -> Result<Arc<[u8]>, String> {
+    pub(super) fn get(&self, path: &str) -> Found {
         let mut taken = self.taken.borrow_mut();
         if let Some((_, found)) = taken.iter().find(|(name, _)| name == path) {
             return found.clone();
@@ -93,9 +96,8 @@ impl Sources {
 
     /// The copies that the run folder needs: places within it, and contents.
     pub fn copies(&self) -> Vec<(PathBuf, Arc<[u8]>)> {
-        let numbered = |(number, (path, found)): (usize, &(String, Result<Arc<[u8]>, String>))| {
-            Some((copy(number, path), found.clone().ok()?))
-        };
+        let numbered =
+            |(number, (path, found)): (usize, &(String, Found))| Some((copy(number, path), found.clone().ok()?));
         self.taken.borrow().iter().enumerate().filter_map(numbered).collect()
     }
 
@@ -124,7 +126,7 @@ impl Sources {
 }
 
 /// What [`Sources::to_bytes`] writes of one file.
-fn entry(bytes: &mut &[u8]) -> Option<(String, Result<Arc<[u8]>, String>)> {
+fn entry(bytes: &mut &[u8]) -> Option<(String, Found)> {
     let mut part = || {
         let (length, rest) = bytes.split_first_chunk::<8>()?;
         let (part, rest) = rest.split_at_checked(u64::from_le_bytes(*length) as usize)?;

@@ -39,7 +39,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let paper = [(inner[2] + 210.0) as i32, (inner[3] + MARGIN[1] + 8.0) as i32];
     canvas::save(folder, "basal-stress", paper, |area| {
         let what = format!("stress {} mm above the floor", canvas::number((a.level * 1e5).round() / 1e2));
-        canvas::write(area, &title(a, &what), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, &what))?;
         let explained = [format!("t = {} s", canvas::number((last.time * 1e5).round() / 1e5)), lengths.explained()];
         let explained: Vec<String> = explained.into_iter().filter(|t| !t.is_empty()).collect();
         canvas::write(area, &explained.join(",  "), 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;

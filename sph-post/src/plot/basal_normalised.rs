@@ -44,7 +44,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let paper = [(inner[2] + 260.0) as i32, (inner[3] + MARGIN[1] + 8.0) as i32];
     canvas::save(folder, "basal-stress-normalised", paper, |area| {
         let what = format!("stress {} mm above the floor", canvas::number((a.level * 1e5).round() / 1e2));
-        canvas::write(area, &title(a, &what), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, &what))?;
         let small = || canvas::style(SMALL, HPos::Left, VPos::Top);
         let time = canvas::number((last.time * 1e5).round() / 1e5);
         let largest = canvas::number((on.largest * 10.0).round() / 1e4);

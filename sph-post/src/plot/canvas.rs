@@ -193,6 +193,14 @@ pub fn write(area: &Area, text: &str, x: f64, y: f64, style: TextStyle<'static>)
     Ok(area.draw(&Text::new(text.to_string(), place(x, y), style))?)
 }
 
+/// Writes what a picture shows along its upper edge, smaller where it would not fit.
+pub fn headline(area: &Area, text: &str) -> Drawn {
+    let room = f64::from(area.dim_in_pixel().0) / f64::from(FINE) - 20.0;
+    // A letter of this font is 0.56 of its size wide, in the mean.
+    let fits = room / (0.56 * text.chars().count().max(1) as f64);
+    write(area, text, 12.0, 8.0, style(fits.clamp(8.0, 15.0), HPos::Left, VPos::Top))
+}
+
 /// Part of an area: left, top, right and bottom in pixels.
 pub fn part<'a>(area: &Area<'a>, [left, top, right, bottom]: [f64; 4]) -> Area<'a> {
     let (a, b) = (place(left, top), place(right, bottom));

@@ -56,7 +56,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let tops = [56.0, 56.0 + INNER[0][1] + MARGIN[1] + 22.0];
     let paper = [(left + INNER[0][0] + 220.0) as i32, (tops[1] + INNER[1][1] + MARGIN[1] + 8.0) as i32];
     canvas::save(folder, "energies", paper, |area| {
-        canvas::write(area, &title(a, "energies"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, "energies"))?;
         canvas::write(area, &times.explained, 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;
         let inner = |k: usize| [left, tops[k], left + INNER[k][0], tops[k] + INNER[k][1]];
         let frame = Frame {

@@ -63,7 +63,7 @@ fn share(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let inner = [left, 56.0, left + INNER[0], 56.0 + INNER[1]];
     let paper = [(inner[2] + 30.0) as i32, (inner[3] + MARGIN[1] + 8.0) as i32];
     canvas::save(folder, "static-share", paper, |area| {
-        canvas::write(area, &title(a, "static share"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, "static share"))?;
         let below = [format!("slower than {}", threshold(a)), times.explained.clone()];
         let below: Vec<String> = below.into_iter().filter(|t| !t.is_empty()).collect();
         canvas::write(area, &below.join(",  "), 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;

@@ -62,7 +62,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     };
     canvas::save(folder, "front", paper, |area| {
         let what = if scaled { "front and run-out" } else { "front" };
-        canvas::write(area, &title(a, what), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, what))?;
         canvas::write(area, &times.explained, 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;
         let points = fronts.iter().flat_map(|f| &f.2).map(|p| value(p.1));
         let mut frame = Frame {

@@ -94,7 +94,7 @@ pub fn draw(
     // The title needs room too, however narrow the panels are.
     let paper = [(width + picture.legend_width).max(560.0) as i32, height as i32];
     canvas::save(folder, picture.name, paper, |area| {
-        canvas::write(area, &title(a, picture.what), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, picture.what))?;
         let explained: Vec<String> =
             [lengths.explained(), times.explained.clone()].into_iter().filter(|t| !t.is_empty()).collect();
         canvas::write(area, &explained.join(",  "), 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;

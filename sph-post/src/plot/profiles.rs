@@ -46,7 +46,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let inner = [MARGIN[0] + 8.0, 58.0, MARGIN[0] + 8.0 + size[0], 58.0 + size[1]];
     let paper = [(inner[2] + 90.0).max(560.0) as i32, (inner[3] + MARGIN[1] + 8.0 + below) as i32];
     canvas::save(folder, "profiles", paper, |area| {
-        canvas::write(area, &title(a, "surface over time"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, "surface over time"))?;
         let explained: Vec<String> =
             [lengths.explained(), times.explained.clone()].into_iter().filter(|t| !t.is_empty()).collect();
         canvas::write(area, &explained.join(",  "), 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;

@@ -31,7 +31,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let tops = [56.0, 56.0 + INNER[1] + MARGIN[1] + 22.0];
     let paper = [(left + INNER[0] + 250.0) as i32, (tops[1] + INNER[1] + MARGIN[1] + 8.0) as i32];
     canvas::save(folder, "time-series", paper, |area| {
-        canvas::write(area, &title(a, "run-out and energies"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, "run-out and energies"))?;
         canvas::write(area, &times.explained, 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;
         for (k, (curves, name)) in [(&fronts, &fronts_name), (&energies, &energies_name)].into_iter().enumerate() {
             let reference = reference.filter(|_| k == 0);

@@ -38,7 +38,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let low = inner[3].max(inner[1] + 20.0 * (curves.len() + 1) as f64);
     let paper = [(inner[2] + 165.0).max(560.0) as i32, (low + MARGIN[1] + 8.0) as i32];
     canvas::save(folder, "surfaces", paper, |area| {
-        canvas::write(area, &title(a, "surface"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, "surface"))?;
         let explained: Vec<String> =
             [lengths.explained(), times.explained.clone()].into_iter().filter(|t| !t.is_empty()).collect();
         canvas::write(area, &explained.join(",  "), 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;

@@ -43,7 +43,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     ];
     let paper = [origin[0] + 2.0 * step[0], origin[1] + 2.0 * step[1] + MARGIN[1] - 20.0];
     canvas::save(folder, "terrain", paper.map(|s| s as i32), |area| {
-        canvas::write(area, &title(a, "on the terrain"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, "on the terrain"))?;
         let line = interval(maps);
         let [east, north, _] = maps.terrain.origin;
         let at = if [east, north] == [0.0; 2] {

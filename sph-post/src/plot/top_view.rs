@@ -63,7 +63,7 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let width = origin[0] + step[0] * columns as f64;
     let height = (origin[1] + step[1] * rows as f64 + MARGIN[1] - 20.0).max(300.0);
     canvas::save(folder, "top-view", [(width + 100.0) as i32, height as i32], |area| {
-        canvas::write(area, &title(a, "height from above"), 12.0, 8.0, canvas::style(15.0, HPos::Left, VPos::Top))?;
+        canvas::headline(area, &title(a, "height from above"))?;
         let explained: Vec<String> =
             [lengths.explained(), times.explained.clone()].into_iter().filter(|t| !t.is_empty()).collect();
         canvas::write(area, &explained.join(",  "), 12.0, 30.0, canvas::style(SMALL, HPos::Left, VPos::Top))?;

@@ -65,7 +65,7 @@ impl Walls {
                 continue;
             }
             let back = depth.min(2.0 * into * dt);
-            p.x[i] = p.x[i] + periods.rounded(S::from_disk(n.map(|n| n * back)));
+            p.x[i] += periods.rounded(S::from_disk(n.map(|n| n * back)));
             let along = [0, 1, 2].map(|a| v[a] + into * n[a]);
             let speed = along.iter().map(|v| v * v).sum::<f64>().sqrt();
             let kept = if smooth { 1.0 } else { (1.0 - into / speed.max(into)).max(0.0) };

@@ -116,8 +116,7 @@ pub fn momentum<const D: usize, const N: usize, S: Space<D, N>, K: Kernel, F: Tr
     pairs: Pairs,
     viscosity: Viscosity,
     stressed: &[Stressed<F, T>],
-    acceleration: &mut [Vector<D>],
-    heat: &mut [f64],
+    (acceleration, heat): (&mut [Vector<D>], &mut [f64]),
 ) {
     let (movers, unit) = (T::movers(neighbors), T::unit(pairs.h));
     let viscosity = Viscosity { strength: viscosity.strength / unit, ..viscosity };

@@ -94,7 +94,7 @@ where
     let per_volume = weight::<D, K>(pairs.h, T::unit(pairs.h));
     Stressed::part::<D, N, S, G>(0..p.len(), p, pairs.spacing, per_volume, weighted, &mut stressed);
     let (mut a, mut heat) = (vec![Vector::default(); p.owned], vec![0.0; p.owned]);
-    momentum::<D, N, S, K, _, T>(0..p.owned, p, neighbors, pairs, viscosity, &stressed, &mut a, &mut heat);
+    momentum::<D, N, S, K, _, T>(0..p.owned, p, neighbors, pairs, viscosity, &stressed, (&mut a, &mut heat));
     (a, heat)
 }
 
