@@ -2,8 +2,10 @@
 //!
 //! A step lasts as long as its slowest rank:
 //!
-//!     t = max over ranks of (c w + (1 - overlap) (m latency + b / bandwidth))
-//!         + 2 ceil(log2 p) latency + (3 m latency + b' / bandwidth) / n
+//! ```text
+//! t = max over ranks of (c w + (1 - overlap) (m latency + b / bandwidth))
+//!     + 2 ceil(log2 p) latency + (3 m latency + b' / bandwidth) / n
+//! ```
 //!
 //! - w: the rank's particles, with copies, images and wall particles at their share of a particle's cost c;
 //! - m: its messages in a step, one to each peer for every exchange; b: the bytes it receives or sends, whichever is more;
