@@ -6,8 +6,8 @@ use formats::{scene::Scene, space::Space};
 use mpi::{collective::SystemOperation, traits::*};
 
 /// Memory `sph-run` needs for a particle, virtual ones included, bytes: state, rates, neighbour list and buffers of
-/// the halo, and rows of a file. Measured: 522 while stepping and 703 while a checkpoint is written with 1.2 10^7 particles
-/// in three dimensions on one rank, up to 900 with 2 10^5, where whole huge pages count.
+/// the halo, and rows of a file. Measured: 581, a checkpoint included, with 1.2 10^7 particles in three dimensions on one
+/// rank, up to 900 with 2 10^5, where whole huge pages count.
 pub const BYTES_PER_PARTICLE: u64 = 900;
 
 /// Memory the preparation needs for a particle, bytes: its row of 144 bytes, and what HDF5 and the exchange copy.
