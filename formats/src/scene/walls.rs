@@ -124,8 +124,9 @@ impl WallLattice {
 
     /// Height of the ground under a point, m; none without a terrain.
     pub fn ground(&self, x: [f64; 3]) -> Option<f64> {
+        let floor = self.terrain.as_ref()?;
         let [x, y] = self.fold(x);
-        self.terrain.as_ref().map(|floor| floor.terrain.height(x, y))
+        Some(floor.terrain.height(x, y))
     }
 
     /// Is there a terrain?
