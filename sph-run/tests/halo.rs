@@ -2,6 +2,7 @@
 //! verification tests, on 1, 2, 3 and 5 ranks; with walls, planes of symmetry, mirror walls and periodic axes, and all of
 //! these across the borders of ranks. The test starts itself again under mpirun.
 
+use crate::support::under_mpi;
 use formats::h5::Communicator;
 use formats::scene::{Scene, WallKind, WallLattice};
 use formats::space::Space as Kind;
@@ -16,7 +17,6 @@ use sph_run::simulation::{Clock, Simulation};
 use sph_run::space::Space;
 use std::collections::BTreeSet;
 
-const MARK: &str = "TALUS_TEST_HALO_UNDER_MPI";
 const DX: f64 = 0.01;
 
 const REST: &str = r#"
@@ -78,27 +78,8 @@ fn scene((head, _, walls): Trial) -> Scene {
 
 #[test]
 fn h4_everything_within_reach_is_there() {
-    if std::env::var_os(MARK).is_none() {
-        for size in ["1", "2", "3", "5"] {
-            let mut mpirun = std::process::Command::new("mpirun");
-            mpirun.args(["-n", size]).arg(std::env::current_exe().unwrap());
-            mpirun.args(["--exact", "halo::h4_everything_within_reach_is_there", "--nocapture", "--test-threads=1"]);
-            let output = mpirun.env(MARK, size).output().expect("mpirun starts");
-            let said = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
-            let passed = output.status.success() && said[0].contains("1 passed");
-            assert!(passed, "{size} ranks: {}\n{}", said[0], said[1]);
-        }
-        return;
-    }
-    let universe = mpi::initialize().unwrap();
+    let Some(universe) = under_mpi("halo::h4_everything_within_reach_is_there", &[1, 2, 3, 5]) else { return };
     let comm = universe.world();
-    assert_eq!(std::env::var(MARK).unwrap(), Reduce::size(&comm).to_string());
-    // A rank that fails alone would leave the others waiting.
-    let hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |info| {
-        hook(info);
-        mpi::traits::Communicator::abort(&mpi::topology::SimpleCommunicator::world(), 1);
-    }));
     for (number, trial) in SCENES.into_iter().enumerate() {
         let scene = scene(trial);
         let starts = [Shares::InTurn, Shares::AllOnTheFirst];

@@ -1,6 +1,7 @@
 //! Forces over all ranks add up to nothing: row H7 of the list of verification tests, on 1, 2, 3 and 5 ranks.
 //! The test starts itself again under mpirun.
 
+use crate::support::under_mpi;
 use formats::scene::Scene;
 use sph_run::algebra::Sym;
 use sph_run::dispatch::{Job, resolve};
@@ -11,8 +12,6 @@ use sph_run::particles::{Particles, id, key};
 use sph_run::physics::Physics;
 use sph_run::simulation::{Clock, Simulation};
 use sph_run::space::Space;
-
-const MARK: &str = "TALUS_TEST_MOMENTUM_UNDER_MPI";
 
 /// Cells along an edge of the block.
 const SIDE: usize = 9;
@@ -36,24 +35,8 @@ time = "1 s"
 
 #[test]
 fn h7_each_pair_counts_once_on_each_side() {
-    if std::env::var_os(MARK).is_none() {
-        for size in ["1", "2", "3", "5"] {
-            let mut mpirun = std::process::Command::new("mpirun");
-            mpirun.args(["-n", size]).arg(std::env::current_exe().unwrap());
-            mpirun.args([
-                "--exact",
-                "momentum::h7_each_pair_counts_once_on_each_side",
-                "--nocapture",
-                "--test-threads=1",
-            ]);
-            let output = mpirun.env(MARK, size).output().expect("mpirun starts");
-            let said = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
-            let passed = output.status.success() && said[0].contains("1 passed");
-            assert!(passed, "{size} ranks: {}\n{}", said[0], said[1]);
-        }
-        return;
-    }
-    let universe = mpi::initialize().expect("MPI starts");
+    let test = "momentum::h7_each_pair_counts_once_on_each_side";
+    let Some(universe) = under_mpi(test, &[1, 2, 3, 5]) else { return };
     let scene = Scene::read("scene", SCENE).unwrap();
     resolve(&scene, Balance { comm: &universe.world(), scene: &scene });
 }

@@ -1,6 +1,6 @@
 //! Orthogonal recursive bisection and the ways between ranks: section H of the list of verification tests.
 
-use crate::support::memory;
+use crate::support::{memory, under_mpi};
 use sph_run::parallel::{Bounds, Reduce, Tree, any_changed, changed, route};
 use std::cell::Cell;
 use std::sync::{Barrier, Mutex};
@@ -469,22 +469,10 @@ fn the_scheme_takes_less_than_a_mebibyte_on_4096_ranks() {
 /// The same tree over MPI: the test starts itself again under mpirun.
 #[test]
 fn over_mpi() {
-    const MARK: &str = "TALUS_TEST_ORB_UNDER_MPI";
+    let Some(universe) = under_mpi("orb::over_mpi", &[1, 2, 3, 5]) else { return };
     let points = jittered(cylinder());
-    if std::env::var_os(MARK).is_none() {
-        for size in ["1", "2", "3", "5"] {
-            let mut mpirun = std::process::Command::new("mpirun");
-            mpirun.args(["-n", size]).arg(std::env::current_exe().unwrap()).args(["--exact", "orb::over_mpi"]);
-            let output = mpirun.env(MARK, size).output().expect("mpirun starts");
-            let said = String::from_utf8_lossy(&output.stdout);
-            assert!(output.status.success() && said.contains("1 passed"), "{size} ranks: {said}");
-        }
-        return;
-    }
-    let universe = mpi::initialize().unwrap();
     let comm = universe.world();
     let (rank, size) = (Reduce::rank(&comm), Reduce::size(&comm));
-    assert_eq!(std::env::var(MARK).unwrap(), size.to_string());
     let tree = Tree::build(points.iter().copied().skip(rank).step_by(size), None, &[0, 1, 2], &comm);
     assert_eq!(tree, built(&points, &[0, 1, 2], size));
     let mut values = [rank as f64, -(rank as f64)];

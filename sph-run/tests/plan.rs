@@ -1,6 +1,7 @@
 //! Plans against runs: what is counted for all ranks on one is what each of several finds. The test starts itself again
 //! under mpirun.
 
+use crate::support::under_mpi;
 use formats::scene::{Material as Law, Scene};
 use sph_run::material::DruckerPrager;
 use sph_run::parallel::Reduce;
@@ -12,7 +13,6 @@ use sph_run::plan::{Options, migration, plan};
 use sph_run::simulation::{Clock, Simulation};
 use sph_run::space::{PlaneStrain, Space, ThreeD};
 
-const MARK: &str = "TALUS_TEST_PLAN_UNDER_MPI";
 const REST: &str = r#"
 [material.drucker-prager]
 density = "2600 kg/m3"
@@ -41,26 +41,8 @@ fn scene(head: &str) -> Scene {
 
 #[test]
 fn a_plan_counts_what_ranks_have() {
-    if std::env::var_os(MARK).is_none() {
-        for size in ["1", "5"] {
-            let mut mpirun = std::process::Command::new("mpirun");
-            mpirun.args(["-n", size]).arg(std::env::current_exe().unwrap());
-            mpirun.args(["--exact", "plan::a_plan_counts_what_ranks_have", "--nocapture", "--test-threads=1"]);
-            let output = mpirun.env(MARK, size).output().expect("mpirun starts");
-            let said = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
-            let passed = output.status.success() && said[0].contains("1 passed");
-            assert!(passed, "{size} ranks: {}\n{}", said[0], said[1]);
-        }
-        return;
-    }
-    let universe = mpi::initialize().unwrap();
+    let Some(universe) = under_mpi("plan::a_plan_counts_what_ranks_have", &[1, 5]) else { return };
     let comm = universe.world();
-    // A rank that fails alone would leave the others waiting.
-    let hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |info| {
-        hook(info);
-        mpi::traits::Communicator::abort(&mpi::topology::SimpleCommunicator::world(), 1);
-    }));
     for (head, state) in [(COLUMN, State::Start), (COLUMN, State::Deposit), (CHANNEL, State::Start)] {
         compare::<3, 6, ThreeD>(&comm, &scene(head), state);
     }
@@ -165,7 +147,7 @@ fn a_plan_says_what_is_asked_and_what_is_wrong() {
     assert!(of(&narrow, 0, "seconds-per-step") > 2.0 * of(&hidden, 0, "seconds-per-step"), "{narrow}");
 
     // A sample of a scene stands for all of it. Its halo is as thick as the reach, 2.76 spacings; that of a lattice has only the
-    // two or three planes that lie within.
+    // two or three planes that lie within: the share is 1.38 times as large at most.
     let sampled = json(&Options { sample: 4000, ..options(&[8]) });
     let whole = json(&options(&[8]));
     for (name, tolerance) in [("owned", 0.03), ("imbalance", 0.1), ("halo-share", 0.38), ("walls-unique", 0.1)] {

@@ -10,6 +10,7 @@ use sph_run::algebra::{Sym, Vector};
 use sph_run::lanes::{Element, Instructions, Parts};
 use sph_run::material::{History, Increment, Material};
 use sph_run::neighbors::Neighbors;
+use sph_run::parallel::Reduce;
 use sph_run::particles::{Particles, key};
 use sph_run::physics::Kernel;
 use sph_run::rates::momentum::{Stressed, Traction, Viscosity, momentum};
@@ -112,6 +113,33 @@ pub fn stress<const N: usize>(law: &impl Material, rate: Sym<N>, density: f64, d
 pub fn close(got: f64, want: f64, tolerance: f64) {
     let error = (got - want).abs() / if want == 0.0 { 1.0 } else { want.abs() };
     assert!(error <= tolerance, "got {got:e}, want {want:e}: error {error:e} above {tolerance:e}");
+}
+
+/// Runs the test of this name again under mpirun, on each of these numbers of ranks. `None` when that is done; under mpirun MPI,
+/// where a rank that fails ends all of them.
+#[track_caller]
+pub fn under_mpi(test: &str, sizes: &[usize]) -> Option<mpi::environment::Universe> {
+    const MARK: &str = "TALUS_TEST_UNDER_MPI";
+    let Ok(size) = std::env::var(MARK) else {
+        for size in sizes.iter().map(usize::to_string) {
+            let mut mpirun = std::process::Command::new("mpirun");
+            mpirun.args(["-n", &size]).arg(std::env::current_exe().unwrap());
+            mpirun.args(["--exact", test, "--nocapture", "--test-threads=1"]);
+            let output = mpirun.env(MARK, &size).output().expect("mpirun starts");
+            let said = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+            let passed = output.status.success() && said[0].contains("1 passed");
+            assert!(passed, "{size} ranks, {}: {}\n{}", output.status, said[0], said[1]);
+        }
+        return None;
+    };
+    let universe = mpi::initialize().expect("MPI starts");
+    assert_eq!(size, Reduce::size(&Communicator::world()).to_string());
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        hook(info);
+        mpi::traits::Communicator::abort(&Communicator::world(), 1);
+    }));
+    Some(universe)
 }
 
 /// MPI with one rank for every test of a program, one test at a time.
