@@ -3,6 +3,7 @@
 
 use crate::error::RunError;
 use formats::folder::RunFolder;
+use formats::laws::{lube_plane_runout, lube_runout};
 use formats::outputs::Index;
 use formats::scene::{Scene, Shape, Wall};
 use formats::snapshot;
@@ -228,12 +229,9 @@ fn spread(scene: &Scene, shape: &Shape, share: f64) -> Heap {
     };
     let (length, height) = ((high[0] - middle).max(middle - low[0]), volume * (high[2] - low[2]));
     let aspect = height / length;
-    let run_out = match (round, aspect < 1.7) {
-        (true, true) => 1.24 * aspect,
-        (true, false) => 1.6 * aspect.sqrt(),
-        (false, true) => 1.2 * aspect,
-        (false, false) => 1.9 * aspect.powf(2.0 / 3.0),
-    };
+    // Where the law of channels has a gap or ends, its upper branch stands in.
+    let in_channel = || lube_plane_runout(aspect).unwrap_or_else(|| 1.9 * aspect.powf(2.0 / 3.0));
+    let run_out = if round { lube_runout(aspect) } else { in_channel() };
     let end = length * (1.0 + share * run_out);
     // Half widths of the plateau: of a frustum end^2 + end p + p^2 = 3 length^2, of a trapezium end + p = 2 length.
     let plateau = match round {
