@@ -29,7 +29,7 @@ const THICKEST: f64 = 0.6;
 const SERVE: f64 = 16.0;
 const _: () = assert!(2.0 + THICKEST < FARTHEST, "sites behind a terrain are found less far");
 
-/// Fixed numbers of a run.
+/// Numbers of a run; all but the skin are fixed.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameters {
     pub spacing: f64,
@@ -41,7 +41,7 @@ pub struct Parameters {
     pub damping: f64,
     /// Density below which the material carries no stress, kg/m3.
     pub gate: f64,
-    /// Skin of the neighbour lists, m.
+    /// Skin of the neighbour lists, m: see [`Simulation::choose_skin`].
     pub skin: f64,
     pub pairs: Pairs,
     pub viscosity: Viscosity,
@@ -209,21 +209,15 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         let (h, skin) = (self.parameters.h, self.parameters.skin);
         let reach = 2.0 * h + skin;
         self.partition.planned.get_or_insert(self.particles.owned as u64);
-        // A particle near a wall is needed twice as far: by the wall particles that others see.
-        let beside_wall = if self.walls.has_sites() { 2.0 * reach } else { reach };
-        let walls = self.walls.clone();
-        let reach_of = |x: Vector<D>| {
-            if walls.distance_of_sites::<D, N, P::Space>(x) < reach { beside_wall } else { reach }
-        };
+        let (reach_of, widest) = self.walls.reaches::<D, N, P::Space>(reach);
         let order = blocks_order(&self.particles.x);
         let x: Vec<Vector<D>> = order.iter().map(|&i| self.particles.x[i as usize]).collect();
         let halo = &mut self.partition.halo;
-        *halo = Halo::plan(self.comm, &x, self.periods.shifts(), reach_of, beside_wall);
+        *halo = Halo::plan(self.comm, &x, self.periods.shifts(), &reach_of, widest);
         let mut needs = vec![false; x.len()];
         if halo.has_peers() {
             // Who may have neighbours among copies, images or walls goes last: the others need not wait for them.
-            let near = |x| self.mirrors.are_near(x, reach) || walls.distance_of_sites::<D, N, P::Space>(x) < reach;
-            needs = x.iter().map(|&x| near(x)).collect();
+            needs = x.iter().map(|&x| self.mirrors.are_near(x, reach) || reach_of(x) > reach).collect();
             halo.needed(|i| needs[i] = true);
         }
         let last = needing_last(&needs);
@@ -247,7 +241,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         if self.partition.halo.has_peers() { self.neighbors.alone() } else { 0 }
     }
 
-    /// What sweeps over the first `end` owned particles need, when those have no neighbours but owned ones.
+    /// Lays out the owned particles, and finds what is near the first `end`, which have no neighbours but owned ones.
     pub fn support_first(&mut self, end: usize) {
         let before = self.watch.enter(Phase::Support);
         let (p, pairs) = (&self.particles, self.parameters.pairs);
@@ -256,8 +250,8 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         self.watch.enter(before);
     }
 
-    /// Velocities of wall particles, from the material around them; then sweeps can begin. The first `known` particles are
-    /// laid out already.
+    /// Velocities of wall particles, from the material around them; then sweeps can begin. The first `known` particles are laid
+    /// out already.
     fn reflect_motion(&mut self, known: usize) {
         let before = self.watch.enter(Phase::Support);
         let (p, pairs) = (&mut self.particles, self.parameters.pairs);
@@ -275,17 +269,20 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
     /// Brings everything around the owned particles up to date, in the one order that is right: halo, then images of
     /// owned and halo, then walls, which see all three.
     pub fn fill(&mut self, fields: Fields) {
-        self.fill_while(fields, |_| 0);
+        self.fill_while(fields, 0, |_| {});
     }
 
-    /// As [`Simulation::fill`], and something else while copies are on their way, of owned particles that need none of them. It
-    /// returns how many of the owned particles it laid out for the sweeps.
-    pub fn fill_while(&mut self, fields: Fields, meanwhile: impl FnOnce(&mut Self) -> usize) {
+    /// As [`Simulation::fill`], and work on the first `ahead` owned particles while copies are on their way, of which they need
+    /// none. The work on motion begins with [`Simulation::support_first`]; of no particles there is none.
+    pub fn fill_while(&mut self, fields: Fields, ahead: usize, meanwhile: impl FnOnce(&mut Self)) {
         let before = self.watch.enter(Phase::Halo);
         let mut halo = std::mem::take(&mut self.partition.halo);
         halo.pack_all(&mut self.particles, fields);
-        let mut known = 0;
-        halo.send(self.comm, || known = meanwhile(self));
+        halo.send(self.comm, || {
+            if ahead > 0 {
+                meanwhile(self);
+            }
+        });
         self.watch.enter(Phase::Halo);
         halo.unpack_all(&mut self.particles, fields);
         self.partition.halo = halo;
@@ -293,7 +290,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         let p = &mut self.particles;
         self.mirrors.fill(p, fields);
         match fields {
-            Fields::Motion => self.reflect_motion(known),
+            Fields::Motion => self.reflect_motion(if ahead > 0 { self.particles.owned } else { 0 }),
             Fields::Stress => {
                 self.walls.fill_stress::<D, N, P::Space, P::Kernel>(p, &self.neighbors, self.parameters.pairs);
             }

@@ -47,7 +47,10 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             self.refresh_volumes();
             // What corrects or diffuses comes before the strain, and needs copies.
             let ahead = if self.parameters.stabilisers.before_the_strain() { 0 } else { self.ahead() };
-            self.fill_while(Fields::Motion, |run| run.strain_ahead(ahead, dt));
+            self.fill_while(Fields::Motion, ahead, |run| {
+                run.support_first(ahead);
+                run.update_stress(0..ahead, dt);
+            });
             strained = ahead;
         }
         if self.parameters.stabilisers.stress_diffusion > 0.0 {
@@ -60,7 +63,10 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.update_stress(strained..self.particles.owned, dt);
         self.refresh_volumes();
         let ahead = self.ahead();
-        self.fill_while(Fields::Stress, |run| run.push_ahead(ahead));
+        self.fill_while(Fields::Stress, ahead, |run| {
+            run.watch.enter(Phase::Acceleration);
+            run.push(0..run.particles.owned, 0..ahead);
+        });
         self.watch.enter(Phase::Stabilisers);
         self.fill_viscosity();
         self.watch.enter(Phase::Acceleration);
@@ -92,16 +98,6 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         }
         self.mirrors.keep_inside(p);
         self.walls.keep_above::<D, N, P::Space>(p, &self.periods, dt);
-    }
-
-    /// Lays out the owned particles and strains the first `ahead` of them. Returns how many are laid out.
-    fn strain_ahead(&mut self, ahead: usize, dt: f64) -> usize {
-        if ahead == 0 {
-            return 0;
-        }
-        self.support_first(ahead);
-        self.update_stress(0..ahead, dt);
-        self.particles.owned
     }
 
     /// Density and stress of some owned particles, in whole blocks, from the velocity gradient.
@@ -157,17 +153,6 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
                 p.viscosity[i] = self.material.viscosity(&step);
             }
         }
-    }
-
-    /// Lays out the owned particles and sums the stresses around the first `ahead` of them. Returns how many are laid out.
-    fn push_ahead(&mut self, ahead: usize) -> usize {
-        if ahead == 0 {
-            return 0;
-        }
-        self.watch.enter(Phase::Acceleration);
-        let owned = self.particles.owned;
-        self.push(0..owned, 0..ahead);
-        owned
     }
 
     /// Accelerations of the owned particles, from the stresses around them. The first `ahead` have been pushed already.

@@ -45,6 +45,18 @@ impl Walls {
         self.lattice.distance(S::to_disk(x))
     }
 
+    /// How far around itself a particle is needed where lists reach so far, by its place, and the most that can be: near walls twice
+    /// as far, by the wall particles that others see.
+    pub fn reaches<const D: usize, const N: usize, S: Space<D, N>>(
+        &self,
+        reach: f64,
+    ) -> (impl Fn(Vector<D>) -> f64 + use<D, N, S>, f64) {
+        let widest = if self.has_sites() { 2.0 * reach } else { reach };
+        let lattice = self.lattice.clone();
+        let of = move |x| if lattice.distance_of_sites(S::to_disk(x)) < reach { widest } else { reach };
+        (of, widest)
+    }
+
     /// Puts owned particles back that have come below a terrain in a drift of length `dt`: the virtual particles carry what is
     /// dense, but not what flies alone. They lose the velocity into the ground and, unless that is smooth, as much of that along
     /// it; nothing moves further than it would have gone without the ground.

@@ -179,14 +179,9 @@ fn counted<const D: usize, const N: usize, S: Space<D, N>>(
         })
         .collect();
 
-    // As in `Simulation::settle`.
     let reach = (2.0 + SKIN) * scene.h();
     let mut walls = Walls::new(WallLattice::new(scene), scene.spacing.powi(D as i32));
-    let beside_wall = if walls.has_sites() { 2.0 * reach } else { reach };
-    let lattice = walls.clone();
-    let reach_of = |x: Vector<D>| {
-        if lattice.distance_of_sites::<D, N, S>(x) < reach { beside_wall } else { reach }
-    };
+    let (reach_of, widest) = walls.reaches::<D, N, S>(reach);
     let shifts = Periods::<D>::new::<N, S>(scene).shifts();
     let mut mirrors = Mirrors::<D, N>::new::<S>(scene);
     let mut loads = vec![Load::default(); ranks];
@@ -195,7 +190,7 @@ fn counted<const D: usize, const N: usize, S: Space<D, N>>(
     for me in 0..ranks {
         let mut p = Particles::<D, N> { x: places(me), ..Particles::default() };
         let by_reach: Vec<f64> = p.x.iter().map(|&x| reach_of(x)).collect();
-        for (peer, copies) in copies_for(me, &boxes, &p.x, &by_reach, &shifts, beside_wall) {
+        for (peer, copies) in copies_for(me, &boxes, &p.x, &by_reach, &shifts, widest) {
             loads[me].peers += 1;
             loads[me].sent += copies.len() as u64;
             loads[me].messages += u64::from(!copies.is_empty());
@@ -205,7 +200,7 @@ fn counted<const D: usize, const N: usize, S: Space<D, N>>(
         let owned = p.x.len();
         p.key = vec![0; owned];
         p.own(owned);
-        mirrors.create(&mut p, reach_of);
+        mirrors.create(&mut p, &reach_of);
         walls.create::<D, N, S>(&mut p, reach);
         sites.extend(&p.key[p.mirror..]);
         loads[me].owned = owned as u64;
