@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::lanes::Instructions;
+use crate::parallel::balance::By;
 use crate::plan;
 use clap::{Parser, ValueEnum, ValueHint};
 use std::path::PathBuf;
@@ -69,6 +70,11 @@ pub struct Cli {
     /// The results have the same bits with all of them.
     #[arg(long, value_name = "SET", default_value = "auto")]
     pub instructions: Wanted,
+
+    /// What is shared out evenly among the ranks, looked at every 50 steps: `work`, the processor time that each was measured to
+    /// take; `particles`, their numbers. The results have the same bits with both.
+    #[arg(long, value_enum, value_name = "BY", default_value_t = By::Work)]
+    pub balance: By,
 
     /// Say nothing but errors.
     #[arg(long)]

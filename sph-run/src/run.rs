@@ -79,6 +79,7 @@ impl Job for Run<'_> {
         let mut simulation =
             Simulation::<D, N, P>::with_instructions(instructions, comm, scene, material, particles, count, clock);
         simulation.always_rebalance = self.cli.always_rebalance;
+        simulation.share_by(self.cli.balance);
         if self.start.fresh() {
             simulation.begin();
         }

@@ -8,10 +8,11 @@ use crate::boundary::wall::Walls;
 use crate::lanes::Instructions;
 use crate::material::Material as _;
 use crate::neighbors::{Neighbors, blocks_order, needing_last};
+use crate::parallel::Reduce;
+use crate::parallel::balance::{Balance, By};
 use crate::parallel::halo::{Fields, Halo};
 use crate::parallel::migrate;
 use crate::parallel::orb::Tree;
-use crate::parallel::{Reduce, changed};
 use crate::particles::Particles;
 use crate::phases::{Phase, Stopwatch};
 use crate::physics::Physics;
@@ -76,8 +77,7 @@ pub struct Clock {
 pub struct Partition<const D: usize> {
     pub tree: Tree,
     pub halo: Halo<D>,
-    /// Particles of this rank when they had gone home to a new tree; none until then.
-    planned: Option<u64>,
+    balance: Balance,
 }
 
 /// One rank's part of a run.
@@ -164,7 +164,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
             clock,
             particles,
             neighbors: Neighbors::default(),
-            partition: Partition { tree, halo: Halo::default(), planned: None },
+            partition: Partition { tree, halo: Halo::default(), balance: Balance::default() },
             periods,
             mirrors: Mirrors::new::<P::Space>(scene),
             walls: Walls::new(WallLattice::new(scene), dx.powi(D as i32)),
@@ -190,16 +190,14 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
     /// Shares the particles out anew if the load has shifted, sends them home, and builds halo, boundaries and lists.
     pub fn rebuild(&mut self) {
         self.periods.wrap(&mut self.particles.x[..self.particles.owned]);
-        let now = self.particles.owned as u64;
-        let mut shifted =
-            [u64::from(self.always_rebalance || self.partition.planned.is_none_or(|then| changed(then, now)))];
-        self.comm.sum(&mut shifted);
-        if shifted[0] > 0 {
-            let owned = &self.particles.x[..self.particles.owned];
+        let (step, computed) = (self.clock.step, self.watch.computed());
+        let partition = &mut self.partition;
+        let off = partition.balance.is_off(self.parameters.count, step, computed, self.comm);
+        if off || self.always_rebalance {
+            let weights: Vec<u64> = partition.balance.weights().collect();
             let axes: Vec<usize> = (0..3).filter(|&a| P::Space::axis(a).is_some()).collect();
-            let places = owned.iter().map(|&x| P::Space::to_disk(x));
-            self.partition.tree = self.partition.tree.rebuilt(places, None, &axes, self.comm);
-            self.partition.planned = None;
+            let places = self.particles.x[..self.particles.owned].iter().map(|&x| P::Space::to_disk(x));
+            partition.tree = partition.tree.rebuilt(places, Some(&weights), &axes, self.comm);
         }
         self.settle();
     }
@@ -208,7 +206,6 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         migrate::owners::<D, N, P::Space>(self.comm, &self.partition.tree, &mut self.particles);
         let (h, skin) = (self.parameters.h, self.parameters.skin);
         let reach = 2.0 * h + skin;
-        self.partition.planned.get_or_insert(self.particles.owned as u64);
         let (reach_of, widest) = self.walls.reaches::<D, N, P::Space>(reach);
         let order = blocks_order(&self.particles.x);
         let x: Vec<Vector<D>> = order.iter().map(|&i| self.particles.x[i as usize]).collect();
@@ -232,6 +229,8 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         self.mirrors.fill(&mut self.particles, Fields::Motion);
         self.walls.create::<D, N, P::Space>(&mut self.particles, reach);
         self.neighbors.build(&self.particles, reach, self.parameters.pairs);
+        let lists = &self.neighbors.of_owned;
+        self.partition.balance.settled((0..lists.len()).map(|i| lists.of(i).len()));
         self.reflect_motion(0);
     }
 
@@ -314,10 +313,17 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         }
     }
 
-    /// Ranks, largest owned count over the mean.
+    /// What is shared out evenly among the ranks, from now on.
+    pub fn share_by(&mut self, by: By) {
+        self.partition.balance.by = by;
+    }
+
+    /// Largest work of a rank over the mean: as last measured, or of owned particles where nothing was. Collective.
     pub fn imbalance(&self) -> f64 {
-        let mut largest = [self.particles.owned as f64];
-        self.comm.max(&mut largest);
-        largest[0] * self.comm.size() as f64 / self.parameters.count.max(1) as f64
+        self.partition.balance.measured().unwrap_or_else(|| {
+            let mut largest = [self.particles.owned as f64];
+            self.comm.max(&mut largest);
+            largest[0] * self.comm.size() as f64 / self.parameters.count.max(1) as f64
+        })
     }
 }

@@ -1,5 +1,6 @@
 //! Tests of the solver, in one binary: the steps of all laws, kernels and spaces are compiled once.
 
+mod balance;
 mod boundaries;
 mod density_gate;
 mod dynamics;

@@ -1,0 +1,88 @@
+//! What ranks share evenly: work. The test starts itself again under mpirun.
+
+use crate::support::under_mpi;
+use formats::h5::Communicator;
+use formats::scene::{Material as Law, Scene};
+use sph_run::material::DruckerPrager;
+use sph_run::parallel::Reduce;
+use sph_run::parallel::balance::By;
+use sph_run::particles::{Particles, key};
+use sph_run::physics::{CubicSpline, Model};
+use sph_run::simulation::{Clock, Simulation};
+use sph_run::space::{PlaneStrain, Space};
+
+const DX: f64 = 0.01;
+const SCENE: &str = r#"
+space = "plane-strain"
+spacing = "1 cm"
+[material.drucker-prager]
+density = "2600 kg/m3"
+young = "6 MPa"
+poisson = 0.3
+friction = "30 deg"
+cohesion = "0 Pa"
+[body.block]
+box = { min = [0, 0, 0], max = [1, 0, 1] }
+[end]
+time = "1 s"
+"#;
+
+/// A block, and beside it as many particles that fly alone.
+fn places() -> Vec<[f64; 3]> {
+    let lattice = |first: f64, step: f64| {
+        (0..1600).map(move |n| [first + f64::from(n % 40) * step, 0.0, f64::from(n / 40) * step])
+    };
+    lattice(0.0, DX).chain(lattice(0.7, 4.0 * DX)).collect()
+}
+
+fn run<'a>(
+    comm: &'a Communicator,
+    scene: &Scene,
+) -> Simulation<'a, 2, 4, Model<PlaneStrain, CubicSpline, DruckerPrager>> {
+    let mut mine = Particles::<2, 4>::default();
+    let all = places();
+    for (n, &x) in all.iter().enumerate().skip(Reduce::rank(comm)).step_by(Reduce::size(comm)) {
+        mine.key.push(key(n as u64, 0));
+        mine.x.push(PlaneStrain::from_disk(x));
+        mine.mass.push(0.26);
+        mine.density.push(2600.0);
+    }
+    let count = mine.key.len();
+    (mine.a, mine.history) = (vec![Default::default(); count], vec![Default::default(); count]);
+    (mine.work, mine.body) = (vec![Default::default(); count], vec![0; count]);
+    mine.own(count);
+    let Law::DruckerPrager(law) = &scene.material else { panic!("the law of the scene") };
+    Simulation::new(comm, scene, DruckerPrager::new(law), mine, all.len() as u64, Clock::default())
+}
+
+/// The largest number of candidates of a rank over the mean.
+fn uneven(run: &Simulation<'_, 2, 4, Model<PlaneStrain, CubicSpline, DruckerPrager>>) -> f64 {
+    let lists = &run.neighbors.of_owned;
+    let mine: u64 = (0..lists.len()).map(|i| lists.of(i).len() as u64).sum();
+    let (mut all, mut largest) = ([mine], [mine as f64]);
+    run.comm.sum(&mut all);
+    run.comm.max(&mut largest);
+    largest[0] * Reduce::size(run.comm) as f64 / all[0] as f64
+}
+
+/// Four ranks with as many particles each have twice and none of the work. By work they are even, to the whole columns that cuts
+/// leave, and to what a particle costs beside its pairs, which candidates alone do not show.
+#[test]
+fn ranks_share_work_and_not_numbers() {
+    let Some(universe) = under_mpi("balance::ranks_share_work_and_not_numbers", &[4]) else { return };
+    let comm = universe.world();
+    let scene = Scene::read("scene.toml", SCENE).expect("a sound scene");
+    for (by, between) in [(By::Particles, [1.6, 2.0]), (By::Work, [1.0, 1.35])] {
+        let mut run = run(&comm, &scene);
+        let at_first = uneven(&run);
+        assert!(at_first > 1.6, "{at_first}");
+        run.share_by(by);
+        run.rebuild();
+        let now = uneven(&run);
+        assert!((between[0]..between[1]).contains(&now), "{by:?}: {now}");
+        // Nothing is to be gained by another cut.
+        let before = run.partition.tree.clone();
+        run.rebuild();
+        assert_eq!(run.partition.tree, before);
+    }
+}
