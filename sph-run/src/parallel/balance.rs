@@ -21,7 +21,7 @@ const WINDOW: u64 = 50;
 /// What a new measurement counts beside those before it.
 const NEW: f64 = 0.3;
 /// Work of a particle beside its pairs, in candidates.
-const BESIDE_PAIRS: u64 = 60;
+pub const BESIDE_PAIRS: u64 = 60;
 /// No particle counts as more than so many times the mean, or less than one part in so many of it: a rank's memory is filled by
 /// particles, not by work.
 const SPREAD: f64 = 2.0;
