@@ -16,6 +16,7 @@ pub mod journal;
 pub mod kernel;
 pub mod laws;
 pub mod lock;
+pub mod memory;
 pub mod outputs;
 pub mod provenance;
 pub mod raster;

@@ -1,4 +1,4 @@
-//! Goes through the snapshots of a run, one at a time.
+//! Goes through the snapshots of a run, one a thread.
 
 use crate::{
     basal::{Basal, Level},
@@ -18,6 +18,7 @@ use crate::{
     section::{self, Section},
     shear::{Grains, Shear},
     terrain::{self, Gatherer, Maps},
+    workers,
 };
 use formats::{
     folder::RunFolder,
@@ -121,7 +122,7 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Evaluates all snapshots of a run, with the particles of the start where no snapshot shows them.
+    /// Evaluates all snapshots of a run in the threads of the pool at hand, with the particles of the start where no snapshot shows them.
     ///
     /// # Errors
     /// Whatever is missing, damaged, or belongs to another scene.
@@ -153,15 +154,16 @@ impl Analysis {
             .map(|start| Layers::new(&geometry, &terrain::places_levelled(&scene, start), choices.layers));
         let grains = Grains::of(&geometry, choices.grain_diameter);
         let colours = &choices.colours[..];
-        let mut moments = Vec::with_capacity(files.len());
-        let mut maps = Gatherer::new(&scene);
-        for (number, (_, file)) in files.iter().enumerate() {
+        let gatherer = Gatherer::new(&scene);
+        let particles = snapshot::read_header(&files[0].1)?.count;
+        let evaluated = workers::each(&files, particles, |number, (_, file)| {
             let inside = sections.contains(&number);
             let drawn = inside || shown.contains(&number) || failure == Some(number);
             let wanted = Wanted { level, static_speed, layers: layers.as_ref(), inside, drawn, grains, colours };
-            moments.push(moment(&scene, &geometry, file, &wanted, maps.as_mut())?);
-        }
-        let maps = maps.map(Gatherer::finish);
+            moment(&scene, &geometry, file, &wanted, gatherer.as_ref())
+        })?;
+        let (moments, layers_on_ground): (Vec<Moment>, Vec<_>) = evaluated.into_iter().unzip();
+        let maps = gatherer.map(|gatherer| gatherer.maps(layers_on_ground.into_iter().flatten().collect()));
         let history = History::read(folder, &index)?;
         let partition = history.as_ref().and_then(Partition::of);
         Ok(Self {
@@ -227,12 +229,10 @@ fn moment(
     geometry: &Geometry,
     file: &Path,
     wanted: &Wanted,
-    maps: Option<&mut Gatherer>,
-) -> Result<Moment, Failure> {
+    gatherer: Option<&Gatherer>,
+) -> Result<(Moment, Option<terrain::Layer>), Failure> {
     let (header, rows) = snapshot::read(file)?;
-    if let Some(maps) = maps {
-        maps.add(header.time, &rows);
-    }
+    let on_ground = gatherer.map(|gatherer| gatherer.layer(header.time, &rows));
     let energy = Energy::new(geometry, &rows);
     let rows = terrain::levelled(scene, rows);
     let sampler = Sampler::new(geometry, &rows);
@@ -241,7 +241,7 @@ fn moment(
     let section = Section::new(geometry, &rows, &sampler, &deposit.profile);
     let layers = wanted.layers.filter(|layers| layers.are_of(&rows));
     let plane = section::plane(geometry, &rows);
-    Ok(Moment {
+    let moment = Moment {
         time: header.time,
         step: header.step,
         particles: rows.len(),
@@ -254,7 +254,8 @@ fn moment(
         section: wanted.inside.then_some(section),
         deposit,
         basal,
-    })
+    };
+    Ok((moment, on_ground))
 }
 
 /// Where the particles were at the start: from the file `sph-prep` made, else from a snapshot of that time.

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Evaluate a run: deposit, run-out, layers, failure plane, stresses, energies, and pictures of them.
 ///
 /// Works on the snapshots that are there, also while the run goes on; every call evaluates all of them anew.
-/// Serial: under mpirun one rank works and the others wait.
+/// Works on several snapshots at a time in threads; under mpirun one rank works and the others wait.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "sph-post", version, after_help = EXIT_CODES)]
 pub struct Arguments {
@@ -44,6 +44,9 @@ pub struct Arguments {
     /// deposit, and `failure_line`
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub reference: Option<PathBuf>,
+    /// Evaluate as many snapshots at a time, as far as they fit into memory; the processors this process may use where left out
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
     /// Print paths, warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,

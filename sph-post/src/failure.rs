@@ -19,6 +19,9 @@ pub enum Failure {
     /// A file can't be read or written.
     #[error(transparent)]
     File(#[from] FileError),
+    /// The system gives no threads.
+    #[error("cannot start the threads: {0}; fewer can be asked for with --threads")]
+    Threads(std::io::Error),
     /// A picture can't be drawn.
     #[error("{path}: cannot be drawn: {what}")]
     Picture {
@@ -33,7 +36,7 @@ impl Failure {
     /// The exit code it leads to.
     pub fn exit_code(&self) -> i32 {
         match self {
-            Self::Scene(_) => exit::USAGE,
+            Self::Scene(_) | Self::Threads(_) => exit::USAGE,
             Self::NoRun { .. } => exit::NO_INPUT,
             Self::File(error) => error.exit_code(),
             Self::Picture { .. } => exit::CANNOT_WRITE,

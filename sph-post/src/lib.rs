@@ -1,6 +1,6 @@
 //! `sph-post`: from the snapshots of a run to numbers (`post/results.nc`, `post/history.nc`) and pictures.
 //!
-//! Serial: one snapshot is in memory at a time, and of several ranks one works. [`geometry`] says what the scene means for the evaluation,
+//! Threads ([`workers`]) evaluate a snapshot each; of several ranks one works. [`geometry`] says what the scene means for the evaluation,
 //! [`sample`] gives fields at any point, [`deposit`], [`basal`], [`dip`], [`energy`], [`layers`], [`section`], [`flow`], [`shear`] and
 //! [`failure_plane`] evaluate one snapshot, [`analysis`] goes through the run, [`partition`] through its history, [`terrain`] maps what
 //! happened on a terrain, [`netcdf`], [`plot`], [`page`] and [`report`] show what it found.
@@ -32,6 +32,7 @@ pub mod summary;
 pub mod terrain;
 #[cfg(test)]
 mod testing;
+pub mod workers;
 
 use analysis::{Analysis, Choices};
 use cli::Arguments;
@@ -48,7 +49,8 @@ use std::{ffi::OsString, io::Write as _, path::PathBuf};
 /// Runs the whole stage and returns the exit code. MPI is set up and wound up within: of several ranks the first one works
 /// and speaks, the others wait and return [`exit::DONE`].
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> i32 {
-    let Some(universe) = mpi::initialize() else {
+    // Of its threads none but the first calls MPI, unless one panics.
+    let Some((universe, _)) = mpi::initialize_with_threading(mpi::Threading::Serialized) else {
         say(format_args!("sph-post: error: MPI is running already; it can be started only once\n"));
         return exit::NUMERICAL;
     };
@@ -80,7 +82,8 @@ fn work(arguments: impl IntoIterator<Item = OsString>) -> i32 {
             return if message.use_stderr() { exit::USAGE } else { exit::DONE };
         }
     };
-    match evaluate(&arguments) {
+    let threads = workers::pool(arguments.threads.map(usize::from)).map_err(Failure::Threads);
+    match threads.and_then(|threads| threads.install(|| evaluate(&arguments))) {
         Ok(paths) => {
             let mut out = std::io::stdout().lock();
             // Whoever closed the pipe wants no more paths; the files are there all the same.

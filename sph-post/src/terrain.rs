@@ -36,31 +36,32 @@ pub struct Maps {
 }
 
 /// Thickness and speed of one snapshot on all cells of the raster.
-struct Layer {
+#[derive(Debug)]
+pub struct Layer {
     time: f64,
     volume: Vec<f64>,
     momentum: Vec<[f64; 3]>,
     beyond: f64,
 }
 
-/// Gathers snapshots.
+/// Lays snapshots on the raster.
+#[derive(Debug)]
 pub struct Gatherer<'a> {
     terrain: &'a Terrain,
     dx: f64,
     /// At the start, kg/m3.
     density: f64,
-    layers: Vec<Layer>,
 }
 
 impl<'a> Gatherer<'a> {
     /// For a scene in three dimensions with a terrain; none for others.
     pub fn new(scene: &'a Scene) -> Option<Self> {
         let terrain = scene.terrain.as_ref().filter(|_| scene.space == Space::ThreeD)?;
-        Some(Self { terrain, dx: scene.spacing, density: scene.material.density(), layers: Vec::new() })
+        Some(Self { terrain, dx: scene.spacing, density: scene.material.density() })
     }
 
-    /// Takes a snapshot; times must ascend.
-    pub fn add(&mut self, time: f64, rows: &Rows) {
+    /// A snapshot on the raster.
+    pub fn layer(&self, time: f64, rows: &Rows) -> Layer {
         let ground = &self.terrain.ground;
         let [nx, ny] = ground.size;
         let (mut volume, mut momentum) = (vec![0.0; nx * ny], vec![[0.0; 3]; nx * ny]);
@@ -79,15 +80,15 @@ impl<'a> Gatherer<'a> {
             }
             beyond += rows.mass[row] * (1.0 - kept);
         }
-        self.layers.push(Layer { time, volume, momentum, beyond: (beyond / mass).max(0.0) });
+        Layer { time, volume, momentum, beyond: (beyond / mass).max(0.0) }
     }
 
-    /// The maps.
-    pub fn finish(self) -> Maps {
+    /// The maps of snapshots whose times ascend.
+    pub fn maps(&self, layers: Vec<Layer>) -> Maps {
         let ground = &self.terrain.ground;
         let [nx, _] = ground.size;
         let mut ends = [[usize::MAX, 0]; 2];
-        for layer in &self.layers {
+        for layer in &layers {
             for c in (0..layer.volume.len()).filter(|&c| layer.volume[c] > 0.0) {
                 for (a, n) in [c % nx, c / nx].into_iter().enumerate() {
                     ends[a] = [ends[a][0].min(n), ends[a][1].max(n)];
@@ -95,7 +96,7 @@ impl<'a> Gatherer<'a> {
             }
         }
         // A margin, so that nothing ends at the border of the map.
-        let whole = ground.values.len() * self.layers.len() <= MOST_VALUES;
+        let whole = ground.values.len() * layers.len() <= MOST_VALUES;
         let range = |a: usize| {
             if whole {
                 return (0, ground.size[a]);
@@ -119,10 +120,10 @@ impl<'a> Gatherer<'a> {
             first: [x0, y0],
             size: [x1 - x0, y1 - y0],
             least,
-            times: self.layers.iter().map(|layer| layer.time).collect(),
-            thickness: self.layers.iter().map(thickness).collect(),
-            speed: self.layers.iter().map(speed).collect(),
-            beyond: self.layers.iter().map(|layer| layer.beyond).collect(),
+            times: layers.iter().map(|layer| layer.time).collect(),
+            thickness: layers.iter().map(thickness).collect(),
+            speed: layers.iter().map(speed).collect(),
+            beyond: layers.iter().map(|layer| layer.beyond).collect(),
         }
     }
 }
@@ -221,12 +222,12 @@ mod tests {
     #[test]
     fn volume_is_kept_and_times_are_interpolated() {
         let terrain = terrain();
-        let mut gatherer = Gatherer { terrain: &terrain, dx: 1.0, density: 2000.0, layers: Vec::new() };
+        let gatherer = Gatherer { terrain: &terrain, dx: 1.0, density: 2000.0 };
         // One cubic metre half on each of two cells, then three of them on one cell, one half off the edge.
         let empty = [[-94.5 + 0.5, 5.0, 2.5]];
-        gatherer.add(0.0, &rows(&empty, 1.0));
-        gatherer.add(2.0, &rows(&[[-91.0, 5.0, 2.5], [-91.0, 5.0, 3.5], [-91.0, 5.0, 4.5], [-88.0, 5.0, 2.5]], 3.0));
-        let maps = gatherer.finish();
+        let later = [[-91.0, 5.0, 2.5], [-91.0, 5.0, 3.5], [-91.0, 5.0, 4.5], [-88.0, 5.0, 2.5]];
+        let maps =
+            gatherer.maps(vec![gatherer.layer(0.0, &rows(&empty, 1.0)), gatherer.layer(2.0, &rows(&later, 3.0))]);
         assert_eq!((maps.first, maps.size), ([0, 0], [6, 5]));
         let sum = |field: &[f64]| field.iter().map(|d| 4.0 * d).sum::<f64>();
         let sums = [0, 1].map(|k| sum(&maps.thickness[k]));

@@ -54,17 +54,11 @@ impl Load {
 /// Infinite where the system doesn't tell. Collective.
 pub fn room(comm: &impl Communicator) -> f64 {
     let here = comm.split_shared(comm.rank()).size();
-    let told = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| available(&text));
+    let told = formats::memory::available();
     let mine = told.map_or(f64::INFINITY, |bytes| bytes as f64 / f64::from(here));
     let mut least = mine;
     comm.all_reduce_into(&mine, &mut least, SystemOperation::min());
     least
-}
-
-/// Bytes available, from the text of /proc/meminfo.
-fn available(meminfo: &str) -> Option<u64> {
-    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
 }
 
 /// Refuses a scene whose preparation needs more than `room` bytes on each of `ranks` ranks.
@@ -176,12 +170,5 @@ mod tests {
         let scene = block(Space::PlaneStrain, 0.01);
         let failure = check(&scene, load(&scene), 1e6, 1).unwrap_err();
         assert!(failure.to_string().contains("fewer ranks"), "{failure}");
-    }
-
-    #[test]
-    fn the_available_memory_is_read() {
-        let text = "MemTotal:       24684092 kB\nMemFree: 1 kB\nMemAvailable:   23936684 kB\n";
-        assert_eq!(available(text), Some(23_936_684 * 1024));
-        assert_eq!(available("MemTotal: 3 kB\n"), None);
     }
 }

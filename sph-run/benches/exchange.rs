@@ -8,7 +8,6 @@
 use formats::h5::Communicator;
 use mpi::ffi;
 use mpi::raw::AsRaw;
-use mpi::traits::Communicator as _;
 use sph_run::parallel::Reduce;
 use sph_run::parallel::exchange::payloads;
 use std::ffi::c_int;

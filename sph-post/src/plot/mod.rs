@@ -21,6 +21,7 @@ mod terrain;
 mod top_view;
 
 use crate::{analysis::Analysis, failure::Failure, geometry::Law};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// Draws everything the run has to show, and returns the paths.
@@ -28,7 +29,6 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// Where a picture can't be written.
 pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let mut paths = Vec::new();
     let all = [
         profiles::draw,
         surfaces::draw,
@@ -48,10 +48,9 @@ pub fn pictures(analysis: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Fail
         basal::draw,
         basal_normalised::draw,
     ];
-    for draw in all {
-        paths.extend(draw(analysis, folder)?);
-    }
-    Ok(paths)
+    // Each by one thread; the paths, and what went wrong first, in this order.
+    let drawn: Vec<Result<Vec<PathBuf>, Failure>> = all.par_iter().map(|draw| draw(analysis, folder)).collect();
+    Ok(drawn.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
 }
 
 /// The law to draw; none where measured curves of the very case are given.

@@ -80,6 +80,27 @@ fn a_block_under_its_own_weight_has_known_numbers() {
     }
 }
 
+/// Every file but the report, which tells when it was made.
+#[test]
+fn threads_change_nothing() {
+    let made = Made::new(SCENES[0].text);
+    spreading(&made);
+    let mut files: [Vec<(String, Vec<u8>)>; 2] = Default::default();
+    for (threads, files) in ["1", "4"].into_iter().zip(&mut files) {
+        let called = post(made.run.path(), &["--threads", threads, "--quiet"]);
+        assert_eq!(called.code, Some(exit::DONE), "{}", called.err);
+        let paths = called.out.lines().filter(|path| !path.ends_with("report.html"));
+        files.extend(paths.map(|path| (path.to_owned(), std::fs::read(path).unwrap())));
+    }
+    let [one, four] = files;
+    assert!(one.len() > 40 && one.len() == four.len());
+    for ((path, one), (_, four)) in one.iter().zip(&four) {
+        assert!(one == four, "{path} differs");
+    }
+    let called = post(made.run.path(), &["--threads", "0"]);
+    assert_eq!(called.code, Some(exit::USAGE));
+}
+
 #[test]
 fn everything_is_written_and_told() {
     for scene in SCENES {
