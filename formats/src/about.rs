@@ -1,5 +1,6 @@
 //! What every program answers about itself, before it looks at anything else: completions for shells, and its manual page.
 
+use crate::news::{self, Log};
 use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, value_parser};
 use clap_complete::Shell;
 use std::ffi::OsString;
@@ -13,12 +14,14 @@ pub enum Asked<P> {
     Text(Vec<u8>),
 }
 
-/// The command line of `P`, with `--completions` and `--man` besides.
+/// The command line of `P`, with `--completions`, `--man` and `--log` besides.
 pub fn command<P: CommandFactory>() -> Command {
     let completions = Arg::new("completions").long("completions").value_name("SHELL").exclusive(true);
     let man = Arg::new("man").long("man").action(ArgAction::SetTrue).exclusive(true);
+    let log = Arg::new("log").long("log").value_name("FORM").value_parser(value_parser!(Log)).default_value("text");
     P::command()
         .arg(completions.value_parser(value_parser!(Shell)).help("Print completions for a shell, and do nothing else"))
+        .arg(log.help("What is said on standard error: lines for people, or a JSON object a line"))
         .arg(man.help("Print the manual page (`--man | man -l -`), and do nothing else"))
 }
 
@@ -41,6 +44,7 @@ pub fn parse<P: CommandFactory + FromArgMatches>(
         clap_mangen::Man::new(command).render(&mut text)?;
         return Ok(Asked::Text(text));
     }
+    news::speak(command.get_name(), matches.get_one("log").copied().unwrap_or_default());
     P::from_arg_matches(&matches).map(Asked::Work).map_err(|error| error.format(&mut command))
 }
 

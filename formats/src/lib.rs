@@ -17,6 +17,7 @@ pub mod kernel;
 pub mod laws;
 pub mod lock;
 pub mod memory;
+pub mod news;
 pub mod outputs;
 pub mod provenance;
 pub mod raster;

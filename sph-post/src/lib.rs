@@ -41,6 +41,7 @@ use formats::{
     about::{self, Asked},
     exit,
     folder::RunFolder,
+    news::{self, Level},
     snapshot::FileError,
 };
 use mpi::{topology::SimpleCommunicator, traits::Communicator as _};
@@ -51,7 +52,7 @@ use std::{ffi::OsString, io::Write as _, path::PathBuf};
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> i32 {
     // Of its threads none but the first calls MPI, unless one panics.
     let Some((universe, _)) = mpi::initialize_with_threading(mpi::Threading::Serialized) else {
-        say(format_args!("sph-post: error: MPI is running already; it can be started only once\n"));
+        news::fail("MPI is running already; it can be started only once", exit::NUMERICAL);
         return exit::NUMERICAL;
     };
     abort_all_ranks_on_panic();
@@ -91,15 +92,10 @@ fn work(arguments: impl IntoIterator<Item = OsString>) -> i32 {
             exit::DONE
         }
         Err(failure) => {
-            say(format_args!("sph-post: error: {failure}\n"));
+            news::fail(&failure.to_string(), failure.exit_code());
             failure.exit_code()
         }
     }
-}
-
-/// Writes to standard error, if anybody listens.
-fn say(message: std::fmt::Arguments<'_>) {
-    let _ = std::io::stderr().write_fmt(message);
 }
 
 /// Evaluates the run and returns the paths of what it wrote.
@@ -135,7 +131,7 @@ fn evaluate(arguments: &Arguments) -> Result<Vec<PathBuf>, Failure> {
     paths.extend(pictures);
     paths.push(report);
     if !arguments.quiet {
-        say(format_args!("{}", report::table(&analysis)));
+        news::show(Level::Note, &report::table(&analysis));
     }
     Ok(paths)
 }

@@ -28,6 +28,7 @@ use fill::Plan;
 use formats::{
     about::{self, Asked},
     exit,
+    news::{self, Level},
     provenance::{self, Entry},
     scene::{Fault, Scene, SceneError, Sources},
     schema::Kept,
@@ -44,7 +45,7 @@ const PANIC: i32 = exit::NUMERICAL;
 /// Runs the whole stage and returns the exit code, the same on all ranks. MPI is set up and wound up within.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> i32 {
     let Some(universe) = mpi::initialize() else {
-        text::say("sph-prep: error: MPI is running already; it can be started only once\n");
+        news::fail("MPI is running already; it can be started only once", exit::USAGE);
         return exit::USAGE;
     };
     // One rank that unwinds would leave the others waiting for ever.
@@ -129,7 +130,7 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
     let talks = comm.rank() == 0;
     let says = |message: String| {
         if talks && !arguments.quiet {
-            text::say(&message);
+            news::show(Level::Note, &message);
         }
     };
     *text = text::share(&arguments.scene, comm)?;
@@ -165,7 +166,8 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
     says(summary::head(&scene, &bodies));
     says(summary::cost(&scene, Load { particles: plan.total(), ..estimate }, ranks));
     if talks {
-        text::say(&advice::warnings(&scene, &plan.lattices, &bodies));
+        let warnings = advice::warnings(&scene, &plan.lattices, &bodies);
+        warnings.split_inclusive('\n').for_each(|warning| news::show(Level::Warning, warning));
     }
     let rows = plan.particles(&scene, snapshot::share(plan.total(), comm.rank() as u64, ranks));
     write(&scene, text, &sources, &rows, plan.total(), staging, comm)

@@ -1,13 +1,11 @@
 //! The scene's text: read once, known to all ranks; and its faults, shown in their place.
 
 use crate::failure::{Failure, agree};
+use formats::news::{self, Level};
 use formats::scene::SceneError;
 use miette::{GraphicalReportHandler, LabeledSpan, MietteDiagnostic, NamedSource, Report, SourceOffset};
 use mpi::traits::*;
-use std::{
-    io::{IsTerminal, Write},
-    path::Path,
-};
+use std::{io::IsTerminal, path::Path};
 
 /// Reads a file on rank 0 and hands its text to all ranks. Collective.
 ///
@@ -46,23 +44,19 @@ pub fn read(path: &Path) -> Result<String, Failure> {
     })
 }
 
-/// Prints to standard error. That nobody listens any more is no failure.
-pub fn say(message: &str) {
-    let _ = std::io::stderr().write_all(message.as_bytes());
-}
-
 /// Prints a failure to standard error. The faults of a scene come one a line; on a terminal each is followed by the
 /// lines of the scene it is about.
 pub fn print(failure: &Failure, text: &str) {
     match failure {
-        Failure::Scene(error) => {
-            say(&format!("{}\n", error.report()));
+        Failure::Scene(error) if !news::is_json() => {
+            news::show(Level::Error, &format!("{}\n", error.report()));
             if std::io::stderr().is_terminal() {
-                say(&excerpts(error, text));
+                news::show(Level::Error, &excerpts(error, text));
             }
         }
+        Failure::Scene(error) => news::fail(&error.report(), failure.exit_code()),
         // Rank 0 prints even if only another rank knows the reason.
-        other => say(&format!("sph-prep: error: {other}\n")),
+        other => news::fail(&other.to_string(), other.exit_code()),
     }
 }
 

@@ -3,7 +3,7 @@
 use formats::folder::RunFolder;
 use formats::outputs::Index;
 use formats::snapshot::FileError;
-use formats::{checkpoint, exit};
+use formats::{checkpoint, exit, news};
 use std::time::SystemTime;
 use std::{fs, io};
 
@@ -14,7 +14,7 @@ pub fn report(folder: &RunFolder) -> i32 {
         Ok(true) => exit::DONE,
         Ok(false) => exit::NO_INPUT,
         Err(error) => {
-            eprintln!("sph-run: error: {error}");
+            news::fail(&error.to_string(), error.exit_code());
             error.exit_code()
         }
     }

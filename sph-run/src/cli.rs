@@ -76,9 +76,13 @@ pub struct Cli {
     #[arg(long, value_enum, value_name = "BY", default_value_t = By::Work)]
     pub balance: By,
 
-    /// Say nothing but errors.
-    #[arg(long)]
+    /// Say nothing but errors and warnings.
+    #[arg(short, long)]
     pub quiet: bool,
+
+    /// Say what goes into log/events.jsonl, too: launches, checkpoints, stops.
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
 
     /// Share the particles out anew whenever neighbour lists are built: slow, for tests.
     #[arg(long, hide = true)]

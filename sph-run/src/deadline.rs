@@ -2,6 +2,7 @@
 
 use crate::cli::WallLimit;
 use crate::scheduler;
+use formats::news::{Level, tell};
 use std::time::{Duration, Instant, SystemTime};
 
 /// What a job needs after this program has ended: mpirun waits a while for ranks that end with a code, and the script has
@@ -30,11 +31,11 @@ impl Deadline {
             WallLimit::Auto => {
                 let found = scheduler::time_left(environment, scheduler::ask, SystemTime::now());
                 if let Some(warning) = found.warning {
-                    eprintln!("sph-run: warning: {warning}");
+                    tell(Level::Warning, &warning);
                 }
                 if let (Some(allowance), false) = (&found.allowance, quiet) {
                     let left = humantime::format_duration(Duration::from_secs(allowance.left.as_secs()));
-                    eprintln!("sph-run: the job has {left} left ({})", allowance.source);
+                    tell(Level::Note, &format!("the job has {left} left ({})", allowance.source));
                 }
                 (Instant::now(), found.allowance.map(|allowance| allowance.left.saturating_sub(AFTERWARDS)))
             }

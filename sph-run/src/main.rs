@@ -3,6 +3,7 @@
 use formats::about::{self, Asked};
 use formats::folder::RunFolder;
 use formats::h5::Communicator;
+use formats::news::{self, Level, tell};
 use formats::scene::{Scene, Sources};
 use formats::{exit, lock};
 use mpi::traits::Communicator as _;
@@ -46,7 +47,7 @@ fn main() {
     let patience = cli.as_ref().map_or(cli::MPI_PATIENCE, |cli| cli.mpi_patience);
     let starting = end_unless_started_within(patience);
     let Some(universe) = mpi::initialize() else {
-        eprintln!("sph-run: MPI can't be initialised");
+        news::fail("MPI can't be initialised", exit::USAGE);
         std::process::exit(exit::USAGE);
     };
     drop(starting);
@@ -81,9 +82,9 @@ fn end_unless_started_within(patience: Duration) -> mpsc::Sender<()> {
     std::thread::spawn(move || {
         if wait.recv_timeout(patience) == Err(mpsc::RecvTimeoutError::Timeout) {
             let seconds = patience.as_secs();
-            eprintln!(
-                "sph-run: MPI has not started within {seconds} s: a rank is missing; the same command tries again"
-            );
+            let message =
+                format!("MPI has not started within {seconds} s: a rank is missing; the same command tries again");
+            news::fail(&message, exit::RESUMABLE);
             signal_hook::low_level::exit(exit::RESUMABLE);
         }
     });
@@ -114,7 +115,7 @@ fn launch(comm: &Communicator, cli: &Cli, signalled: Arc<AtomicBool>, begun: Ins
         }
         Err(error) => {
             if comm.rank() == 0 {
-                eprintln!("sph-run: error: {error}");
+                news::fail(&error.to_string(), error.exit_code());
             }
             error.exit_code()
         }
@@ -164,7 +165,7 @@ fn run(
     let lock = agree(comm, || {
         let job = scheduler::job_id(|name| std::env::var(name).ok());
         let terms = lock::Terms { patience: cli.lock_patience, job };
-        Ok(lock::RunLock::acquire_on(&folder.lock(), &terms, |news| eprintln!("sph-run: {news}"))?)
+        Ok(lock::RunLock::acquire_on(&folder.lock(), &terms, |news| tell(Level::Note, news))?)
     })?;
     let deadline = agree(comm, || Ok(Deadline::find(cli.wall_limit, begun, cli.quiet)))?.unwrap_or_default();
     let mut past = Past::default();

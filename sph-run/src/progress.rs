@@ -1,7 +1,7 @@
 //! News for the user: a bar on a terminal, plain lines under mpirun, in a pipe or in a batch log. Rank 0 only.
 
 use crate::simulation::Clock;
-use formats::journal;
+use formats::{journal, news};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -41,7 +41,9 @@ impl Progress {
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left");
         let sink = match style {
             _ if silent => Sink::Nowhere,
-            Ok(style) if std::io::stderr().is_terminal() => Sink::Bar(ProgressBar::new(TICKS).with_style(style)),
+            Ok(style) if std::io::stderr().is_terminal() && !news::is_json() => {
+                Sink::Bar(ProgressBar::new(TICKS).with_style(style))
+            }
             _ => Sink::Lines { next: 0.0, last: Instant::now() },
         };
         let (start, start_time, start_step) = (Instant::now(), clock.time, clock.step);
@@ -106,14 +108,19 @@ impl Progress {
             Sink::Lines { next, last } if done >= *next || last.elapsed() > SILENCE => {
                 *next = (done * 10.0).floor() / 10.0 + 0.1;
                 *last = Instant::now();
+                let keys = serde_json::json!({
+                    "done": done, "time_s": clock.time, "end_s": self.end, "step": clock.step, "time_step_s": clock.time_step,
+                    "particle_steps_per_second": rate, "left_s": left,
+                });
                 let left = left.map_or_else(String::new, |left| format!(", about {left:.0} s left"));
-                eprintln!(
+                let line = format!(
                     "{:>3.0} %  t = {:.4} s, step {}, dt = {:.2e} s, {rate:.2e} particle-steps/s{left}",
                     100.0 * done,
                     clock.time,
                     clock.step,
                     clock.time_step
                 );
+                news::progress(&line, keys);
             }
             Sink::Lines { .. } | Sink::Nowhere => {}
         }

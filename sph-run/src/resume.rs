@@ -7,6 +7,7 @@ use crate::limits::clear_stale_stop_file;
 use crate::simulation::Clock;
 use formats::folder::RunFolder;
 use formats::journal::Event;
+use formats::news::{Level, tell};
 use formats::scene::{Change, Output, Scene};
 use formats::{checkpoint, disk, snapshot::FileError};
 use std::fs;
@@ -53,7 +54,7 @@ impl Start {
             };
             if !extended && cli.resume.is_none() {
                 if !cli.quiet {
-                    eprintln!("sph-run: nothing to do, the run is done");
+                    tell(Level::Note, "nothing to do, the run is done");
                 }
                 return Ok(None);
             }
@@ -75,7 +76,7 @@ impl Start {
             }
             Some(checkpoint::Found { manifest, state, warnings }) => {
                 for warning in warnings {
-                    eprintln!("sph-run: warning: {warning}; an older checkpoint is used");
+                    tell(Level::Warning, &format!("{warning}; an older checkpoint is used"));
                 }
                 let message = String::from("its manifest lacks the clock");
                 let clock = clock_from_json(&manifest.clock, manifest.step)
@@ -89,10 +90,10 @@ impl Start {
             start.adapt(folder, &then, cli.quiet, ranks)?;
         }
         if clear_stale_stop_file(folder) {
-            eprintln!("sph-run: warning: a STOP file from before this launch is removed; make it anew to stop the run");
+            tell(Level::Warning, "a STOP file from before this launch is removed; make it anew to stop the run");
         }
         if !start.fresh() && !cli.quiet {
-            eprintln!("sph-run: resuming at t = {:.4} s, step {}", start.clock.time, start.clock.step);
+            tell(Level::Note, &format!("resuming at t = {:.4} s, step {}", start.clock.time, start.clock.step));
         }
         Ok(Some((start, past)))
     }
@@ -105,7 +106,7 @@ impl Start {
         }
         for change in &changes {
             if !quiet {
-                eprintln!("sph-run: changed in the scene: {change}");
+                tell(Level::Note, &format!("changed in the scene: {change}"));
             }
             let event = Event::now("scene-changed", self.clock.step, self.clock.time, ranks);
             let _ = fs::create_dir_all(folder.log());

@@ -23,6 +23,7 @@ use formats::folder::RunFolder;
 use formats::h5::{self, Communicator};
 use formats::journal::{self, Event};
 use formats::lock::{LockError, RunLock};
+use formats::news::{Level, tell};
 use formats::provenance::{self, Entry};
 use formats::scene::Scene;
 use formats::schema::Kept;
@@ -89,7 +90,7 @@ impl Job for Run<'_> {
             Outputs::open(self.folder, then, self.scene.space)
         })?;
         if rank == 0 && !self.cli.quiet && !self.start.over {
-            eprintln!("sph-run: pairs in {}", self.numbers());
+            tell(Level::Note, &format!("pairs in {}", self.numbers()));
         }
         let progress = Progress::new(self.cli.quiet || rank != 0, &simulation.clock, self.scene.end.time, count);
         let pace = Pace::new(self.past.write_seconds.map(Duration::from_secs_f64));
@@ -201,6 +202,9 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
     /// Notes in the journal what happens; rank 0 only. Nothing depends on it, so a failure is none of the run's.
     fn note(&self, event: &str, what: &str) {
         if self.job.lock.is_some() {
+            if self.job.cli.verbose {
+                tell(Level::Note, &format!("step {}, {event}: {what}", self.simulation.clock.step));
+            }
             let (clock, ranks) = (&self.simulation.clock, self.job.comm.size() as u64);
             let now = Event::now(event, clock.step, clock.time, ranks);
             let _ = Event { job: self.job.deadline.job.clone(), what: what.into(), ..now }.append(self.job.folder);
@@ -413,7 +417,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
         }
         let written = snapshot::write(&state, &header, &rows, Kept::Checkpoint, self.job.comm);
         if let (Err(error), 0) = (written, self.job.comm.rank()) {
-            eprintln!("sph-run: warning: the faulty state could not be kept: {error}");
+            tell(Level::Warning, &format!("the faulty state could not be kept: {error}"));
         }
         self.note("failed", &fault.to_string());
         RunError::Numerical { fault, state }

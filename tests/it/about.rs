@@ -87,3 +87,60 @@ fn terminals_get_no_colours_where_they_are_not_wanted() {
         assert_eq!(colours(&command, Some("1")), 0, "{name}");
     }
 }
+
+/// All that the programs say on the way from a scene to results, and why they refuse, is a JSON object a line where that is asked for.
+#[test]
+fn what_programs_say_can_be_read_by_programs() {
+    let work = WorkFolder::new();
+    let scene = work.write(
+        "scene.toml",
+        "space = \"plane-strain\"\nspacing = 0.01\n[kernel]\nh-over-dx = 1.5\n[material.drucker-prager]\ndensity = 2600\n\
+         young = 4e5\npoisson = 0.3\nfriction = 30\ncohesion = 0\n[body.b]\nbox = { min = [0, 0, 0], max = [0.1, 0, 0.1] }\n\
+         [wall.floor]\naxis = \"z\"\nat = 0\nside = \"above\"\nslip = \"no-slip\"\n[end]\ntime = 0.02\n",
+    );
+    let run = work.join("run");
+    let [scene, run] = [&scene, &run].map(|path| path.to_str().unwrap());
+    let said = |program: &str, words: &[&str], code: i32| {
+        let words = [words, &["--log", "json"]].concat();
+        let output = tests::run(program, &words, 0).expect(code);
+        let objects: Vec<serde_json::Value> = output
+            .stderr
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}\n{output}")))
+            .collect();
+        for object in &objects {
+            assert!(
+                object["program"] == program && object["time"].is_string() && object["message"].is_string(),
+                "{object}"
+            );
+        }
+        objects
+    };
+    let levels = |objects: &[serde_json::Value], level: &str| objects.iter().filter(|o| o["level"] == level).count();
+    let prepared = said("sph-prep", &[scene, "-o", run], exit::DONE);
+    assert!(levels(&prepared, "note") >= 2 && levels(&prepared, "warning") == 1, "{prepared:?}");
+    let computed = said("sph-run", &[run, "--verbose"], exit::DONE);
+    let last = computed.iter().rfind(|object| object["level"] == "progress").unwrap();
+    assert!(
+        last["step"].as_u64().unwrap() > 50 && last["end_s"] == 0.02 && last["done"].as_f64().unwrap() > 0.8,
+        "{last}"
+    );
+    assert!(
+        computed.iter().any(|object| object["message"].as_str().unwrap().contains("checkpoint: gen-")),
+        "{computed:?}"
+    );
+    assert_eq!(levels(&said("sph-post", &[run], exit::DONE), "note"), 1);
+    for (program, words, code) in [
+        ("sph-prep", vec![scene, "-o", run], exit::CANNOT_WRITE),
+        ("sph-prep", vec!["no.toml", "-o", "x"], exit::NO_INPUT),
+        ("sph-run", vec!["no-run"], exit::NO_INPUT),
+        ("sph-post", vec!["no-run"], exit::NO_INPUT),
+    ] {
+        let refused = said(program, &words, code);
+        let last = refused.last().unwrap();
+        assert!(last["level"] == "error" && last["exit_code"] == code, "{program} {words:?}: {refused:?}");
+    }
+    let wrong = work.write("wrong.toml", "space = \"4d\"\n");
+    let refused = said("sph-prep", &[wrong.to_str().unwrap(), "-o", "x"], exit::USAGE);
+    assert!(refused[0]["message"].as_str().unwrap().contains("wrong.toml:1") && refused[0]["exit_code"] == exit::USAGE);
+}

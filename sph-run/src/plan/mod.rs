@@ -11,7 +11,7 @@ mod table;
 
 use crate::error::RunError;
 use cost::{Costs, Machine};
-use formats::exit;
+use formats::{exit, news};
 use partition::Partition;
 use places::{Source, State};
 use std::path::Path;
@@ -84,7 +84,7 @@ pub fn report(path: &Path, options: &Options) -> i32 {
             exit::DONE
         }
         Err(error) => {
-            eprintln!("sph-run: error: {error}");
+            news::fail(&error.to_string(), error.exit_code());
             error.exit_code()
         }
     }
