@@ -175,6 +175,7 @@ fn the_least_scene_gets_all_defaults() {
         }],
         terrain: None,
         files: Vec::new(),
+        chosen: None,
         walls: vec![Wall {
             axis: 2,
             at: 0.0,
@@ -222,6 +223,7 @@ fn every_key_is_read() {
         ],
         terrain: None,
         files: Vec::new(),
+        chosen: None,
         walls: vec![
             Wall { axis: 0, at: 0.5, side: -1.0, slip: Slip::FreeSlip, kind: WallKind::Virtual, velocity: [0.0; 3] },
             Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip, kind: WallKind::Virtual, velocity: [0.0; 3] },
