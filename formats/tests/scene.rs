@@ -344,7 +344,7 @@ fn values_of_the_wrong_kind() {
         "space",
         "did you mean `axisymmetric`? valid: plane-strain",
     );
-    bad(COLUMN, "\"axisymmetric\"", "2", (1, 9), "space", "\"3d\" is needed, not a number");
+    bad(COLUMN, "\"axisymmetric\"", "2", (1, 9), "space", "\"3d\", \"auto\" is needed, not a number");
     bad(COLUMN, "[end]", "[kernel]\nkind = \"cubic\"\n[end]", (21, 8), "kernel.kind", "unknown name `cubic`");
     bad(COLUMN, "[end]", "[[kernel]]\n[end]", (20, 1), "kernel", "a table is needed, not an array");
     bad(COLUMN, "spacing", "title = 3\nspacing", (2, 9), "title", "a string in quotes is needed, not a number");

@@ -4,6 +4,7 @@
 //! one file of all ranks. What the run costs is told, and refused, before anything is allocated. Failures are agreed upon after each part, so that all ranks leave together.
 
 pub mod advice;
+pub mod chosen;
 pub mod cli;
 pub mod explain;
 pub mod failure;
@@ -111,7 +112,9 @@ fn explain(words: impl IntoIterator<Item = OsString>) -> i32 {
     match scene {
         Ok(scene) => {
             // Whoever closed the pipe has read enough.
-            let _ = write!(std::io::stdout(), "{}", explain::text(&scene));
+            let smaller = Scene::smaller("", &text, &Sources::of(&arguments.scene));
+            let advice = chosen::advice(&scene, smaller.as_ref());
+            let _ = write!(std::io::stdout(), "{}", explain::text(&scene, advice.as_deref()));
             exit::DONE
         }
         Err(failure) => {
@@ -165,6 +168,8 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
     says(summary::head(&scene, &bodies));
     says(summary::cost(&scene, Load { particles: plan.total(), ..estimate }, ranks));
     if talks {
+        let smaller = Scene::smaller(&name, text, &sources);
+        says(chosen::block(&scene) + &chosen::advice(&scene, smaller.as_ref()).unwrap_or_default());
         text::say(&advice::warnings(&scene, &plan.lattices, &bodies));
     }
     let rows = plan.particles(&scene, snapshot::share(plan.total(), comm.rank() as u64, ranks));
@@ -219,7 +224,8 @@ fn write(
         let folder = staging.folder().clone();
         staging.write(&folder.scene(), text.as_bytes())?;
         sources.write(folder.path()).map_err(|error| Failure::output(folder.path(), &error))?;
-        provenance::append(&folder.provenance(), Entry::this("sph-prep", comm.size() as usize))?;
+        let entry = Entry { chosen: chosen::sentences(scene), ..Entry::this("sph-prep", comm.size() as usize) };
+        provenance::append(&folder.provenance(), entry)?;
         staging.publish()
     });
     agree(comm, finished)
