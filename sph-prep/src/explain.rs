@@ -221,7 +221,7 @@ fn without(scene: &Scene) -> Vec<String> {
         Space::Axisymmetric => {
             say(
                 "All is the same around the axis, and the deposit round by construction: no swirl, no fingers, no wall beside it. \
-                 Near the axis the scheme is less accurate: the pressure there is too low.",
+                 Near the axis the scheme is less accurate: the pressure dips there.",
             );
         }
         Space::ThreeD => {}

@@ -153,10 +153,14 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
     let ranks = comm.size() as u64;
     let lattices = fill::lattices(&scene);
     let estimate = Load::of(&scene, &lattices);
+    // Looked for only where somebody reads of it.
+    let smaller = if talks && !arguments.quiet { Scene::smaller(&name, text, &sources) } else { None };
+    let choices = || chosen::block(&scene) + &chosen::advice(&scene, smaller.as_ref()).unwrap_or_default();
     if let Err(failure) = memory::check(&scene, estimate, memory::room(comm), ranks) {
         // Even counting would take too long.
         says(summary::head(&scene, &summary::estimated(&scene, &lattices)));
         says(summary::cost(&scene, estimate, ranks));
+        says(choices());
         return Err(failure);
     }
 
@@ -167,9 +171,8 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
     }
     says(summary::head(&scene, &bodies));
     says(summary::cost(&scene, Load { particles: plan.total(), ..estimate }, ranks));
+    says(choices());
     if talks {
-        let smaller = Scene::smaller(&name, text, &sources);
-        says(chosen::block(&scene) + &chosen::advice(&scene, smaller.as_ref()).unwrap_or_default());
         text::say(&advice::warnings(&scene, &plan.lattices, &bodies));
     }
     let rows = plan.particles(&scene, snapshot::share(plan.total(), comm.rank() as u64, ranks));

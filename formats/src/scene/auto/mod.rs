@@ -72,7 +72,8 @@ impl Scene {
         let space = text_at(document.get_ref(), &["space"])?.to_string();
         let may_be_less = space == Space::ThreeD.name()
             || space == Space::PlaneStrain.name() && !has(document.get_ref(), &["symmetry"]);
-        if !errors.is_empty() || !may_be_less {
+        // On a terrain nothing can be left out, and rasters are large.
+        if !errors.is_empty() || !may_be_less || has(document.get_ref(), &["terrain"]) {
             return None;
         }
         let names_planes = has(document.get_ref(), &["symmetry"]);
