@@ -141,6 +141,40 @@ mod tests {
         assert!(quarter.contains("not chosen   axisymmetric: body `heap` is no upright cylinder"), "{quarter}");
     }
 
+    /// Volume of all particles, m3; m2 in plane strain.
+    fn volume(scene: &Scene) -> f64 {
+        let of = |lattice: &Lattice| {
+            let columns = (0..lattice.columns()).map(|number| lattice.column(number));
+            columns.map(|column| column.cells as f64 * lattice.bulk_volume(&column)).sum::<f64>()
+        };
+        fill::lattices(scene).iter().map(of).sum()
+    }
+
+    #[test]
+    fn what_is_left_out_is_there_as_images_around_or_along() {
+        let between = |text: &str| {
+            let wall = |at: &str, side: &str| {
+                format!("[wall.{side}]\naxis = \"y\"\nat = {at}\nside = \"{side}\"\nslip = \"free-slip\"\n")
+            };
+            format!("{text}{}{}", wall("-0.1", "above"), wall("0.1", "below"))
+        };
+        let wedges = "wedge = { corner = [0, -0.1, 0], size = [0.2, 0.2, 0.1], falls = \"left\" }\n[body.other]\n\
+                      wedge = { corner = [0, -0.1, 0], size = [0.2, 0.2, 0.1], falls = \"right\" }";
+        // What the part has to be multiplied with, and how exactly: circles are cut into squares.
+        for (text, times, exactly) in [
+            (text("auto", BOX), 4.0, 1e-12),
+            (text("auto", wedges), 4.0, 1e-12),
+            (between(&text("auto", BOX)), 2.0 * 0.2, 1e-12),
+            (between(&text("auto", wedges)), 2.0 * 0.2, 1e-12),
+            (text("3d", CYLINDER).replace("spacing", "symmetry = \"auto\"\nspacing"), 4.0, 1e-12),
+            (text("auto", CYLINDER), 1.0, 0.01),
+        ] {
+            let scene = read(&text);
+            let full = volume(&scene.chosen.as_ref().unwrap().full);
+            assert!((times * volume(&scene) / full - 1.0).abs() < exactly, "{} of {full}: {text}", volume(&scene));
+        }
+    }
+
     #[test]
     fn a_scene_that_could_be_smaller_is_told_so() {
         let told = |space: &str, shape: &str| {

@@ -157,7 +157,9 @@ pub(super) fn resolve(
             faults.add(edit::place(&document, path), &key, message);
             SceneError { file: name.to_string(), faults: faults.into_list() }
         })?;
-        let value = format!("{:.2e} m/s", motion::TIMES_FASTEST * bound.speed);
+        // Three digits, as one would write it; the others mean nothing.
+        let value = format!("{:.2e}", motion::TIMES_FASTEST * bound.speed);
+        let value = format!("{} m/s", value.parse().unwrap_or(f64::NAN));
         edit::set_text(&mut document, path, &value);
         choices.push(Choice { key, value: format!("\"{value}\""), why: bound.why, binds: true });
     }
@@ -187,76 +189,74 @@ fn reduced(
     chosen: &mut Chosen,
     read: impl Fn(&DeTable<'_>) -> Result<Scene, SceneError>,
 ) -> Result<Scene, SceneError> {
-    let full = &*chosen.full;
-    let mut take = |what: &str, found: Result<Reduction, String>| match found {
-        Ok(reduction) => Some(reduction),
-        Err(why) => {
-            chosen.refused.push(format!("{what}: {why}"));
-            None
-        }
+    let full = (*chosen.full).clone();
+    let mut take = |what: &str, found: Result<Reduction, String>| {
+        found.map_err(|why| chosen.refused.push(format!("{what}: {why}"))).ok()
     };
     let flat = if asked.space {
         // No body can have both shapes, so that at most one of them is found.
-        let round = take("axisymmetric", symmetry::axisymmetric(full));
-        round.or_else(|| take("plane strain", symmetry::plane_strain(full)))
+        let round = take("axisymmetric", symmetry::axisymmetric(&full));
+        round.or_else(|| take("plane strain", symmetry::plane_strain(&full)))
     } else {
         None
     };
     let (mut planes, mut no_planes) = (Vec::new(), Vec::new());
     if asked.symmetry && full.space != Space::Axisymmetric {
         for &axis in full.space.axes().iter().filter(|&&axis| axis < 2) {
-            match symmetry::mirrored(full, axis) {
+            match symmetry::mirrored(&full, axis) {
                 Ok(reduction) => planes.push((axis, reduction)),
                 Err(why) => no_planes.push((axis, format!("{}: {why}", PLANES[axis]))),
             }
         }
     }
 
-    let mut refusals = Vec::new();
     for combination in combinations(flat.as_ref(), &planes) {
         let mut edited = document.clone();
         let edits: Vec<Edit> = combination.iter().flat_map(|part| part.edits.clone()).collect();
-        edit::apply(&mut edited, full, &edits);
+        edit::apply(&mut edited, &full, &edits);
         match read(&edited) {
             Ok(scene) => {
-                let whys = |about: &str| {
-                    let of = combination.iter().filter(|part| part.key == about);
-                    of.map(|part| part.why.clone()).collect::<Vec<_>>().join("; ")
-                };
-                let mut choices = Vec::new();
-                if asked.space {
-                    let why = whys("space");
-                    let why = if why.is_empty() { "nothing less would do for what is described".into() } else { why };
-                    let value = format!("\"{}\"", scene.space.name());
-                    choices.push(Choice { key: "space".into(), value, why, binds: true });
-                }
-                if asked.symmetry && scene.space != Space::Axisymmetric {
-                    let why = whys("symmetry");
-                    let why = if why.is_empty() { "the scene is no mirror image of itself".into() } else { why };
-                    let planes = ["x", "y"].into_iter().zip(scene.symmetry).filter(|(_, is)| *is);
-                    let names: Vec<_> = planes.map(|(name, _)| format!("\"{name}\"")).collect();
-                    let value = format!("[{}]", names.join(", "));
-                    choices.push(Choice { key: "symmetry".into(), value, why, binds: true });
-                }
-                choices.append(&mut chosen.choices);
-                chosen.choices = choices;
+                chosen.choices.splice(0..0, made(&scene, asked, &combination));
                 if !combination.is_empty() && scene.initial.jitter > 0.0 {
-                    let note = "The random displacement of particles at the start is no asymmetry of the scene: it is drawn anew for \
-                                what is computed, and what it breaks in the whole is left out.";
-                    chosen.notes.push(note.into());
+                    chosen.notes.push(JITTER.into());
                 }
-                chosen.refused.append(&mut refusals);
                 // Of the axes that are left; around the axis of r-z all is mirrored anyway.
-                let left = scene.space.axes().iter().filter(|_| scene.space != Space::Axisymmetric);
-                let left: Vec<_> = left.copied().collect();
-                chosen.refused.extend(no_planes.into_iter().filter(|(a, _)| left.contains(a)).map(|(_, why)| why));
+                let is_left = |axis: &usize| scene.space != Space::Axisymmetric && scene.space.axes().contains(axis);
+                chosen.refused.extend(no_planes.into_iter().filter(|(axis, _)| is_left(axis)).map(|(_, why)| why));
                 return Ok(scene);
             }
-            Err(error) => refusals.push(refusal(&combination, &error)),
+            Err(error) => chosen.refused.push(refusal(&combination, &error)),
         }
     }
     // The last combination is empty: the full scene, which was sound already.
     read(document)
+}
+
+const JITTER: &str = "The random displacement of particles at the start is no asymmetry of the scene: it is drawn anew for what is \
+                      computed, and what it breaks in the whole is left out.";
+
+/// The choices of a space and of planes that a combination of reductions stands for.
+fn made(scene: &Scene, asked: &Asked, combination: &[&Reduction]) -> Vec<Choice> {
+    let mut choices = Vec::new();
+    if asked.space {
+        let flat = combination.iter().find_map(|part| part.flat.as_ref());
+        let why = flat.map_or("nothing less would do for what is described".into(), |flat| flat.why.clone());
+        let value = format!("\"{}\"", scene.space.name());
+        choices.push(Choice { key: "space".into(), value, why, binds: true });
+    }
+    if asked.symmetry && scene.space != Space::Axisymmetric {
+        let planes: Vec<_> = ["x", "y"].into_iter().zip(scene.symmetry).filter(|(_, is)| *is).map(|(n, _)| n).collect();
+        let why = if planes.is_empty() {
+            "the scene is no mirror image of itself".into()
+        } else {
+            let planes = planes.join(" = 0 and ");
+            format!("bodies with their velocities, walls and gravity are their own mirror images in {planes} = 0")
+        };
+        let names: Vec<_> = planes.iter().map(|name| format!("\"{name}\"")).collect();
+        let value = format!("[{}]", names.join(", "));
+        choices.push(Choice { key: "symmetry".into(), value, why, binds: true });
+    }
+    choices
 }
 
 const PLANES: [&str; 2] = ["mirror symmetry about x = 0", "mirror symmetry about y = 0"];
@@ -266,7 +266,7 @@ fn combinations<'r>(flat: Option<&'r Reduction>, planes: &'r [(usize, Reduction)
     let mut all = Vec::new();
     if let Some(flat) = flat {
         let x = planes.iter().find(|(axis, _)| *axis == 0).map(|(_, reduction)| reduction);
-        if let (Some(x), Some(Space::PlaneStrain)) = (x, flat.space) {
+        if let (Some(x), Some(Space::PlaneStrain)) = (x, flat.flat.as_ref().map(|flat| flat.space)) {
             all.push(vec![flat, x]);
         }
         all.push(vec![flat]);

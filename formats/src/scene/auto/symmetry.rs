@@ -12,13 +12,17 @@ use crate::{
 pub(super) struct Reduction {
     /// In words, for refusals.
     pub name: &'static str,
-    /// The key that it is a value of: `space` or `symmetry`.
-    pub key: &'static str,
-    /// The space it leads to, where that is another one.
-    pub space: Option<Space>,
+    /// Of fewer dimensions; else cut at a plane.
+    pub flat: Option<Flat>,
     /// What changes in the document.
     pub edits: Vec<Edit>,
-    /// Why it does, in words.
+}
+
+/// Fewer dimensions.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Flat {
+    pub space: Space,
+    /// Why they do, in words.
     pub why: String,
 }
 
@@ -64,7 +68,7 @@ pub(super) fn axisymmetric(scene: &Scene) -> Result<Reduction, String> {
         "all bodies are upright cylinders around the axis x = {x} m, y = {y} m{origin}; no wall stands beside them, and nothing pulls \
          or moves sideways"
     );
-    Ok(Reduction { name: "axisymmetric", key: "space", space: Some(Space::Axisymmetric), edits, why })
+    Ok(Reduction { name: "axisymmetric", flat: Some(Flat { space: Space::Axisymmetric, why }), edits })
 }
 
 /// Nothing changes along y; or why something does.
@@ -104,7 +108,7 @@ pub(super) fn plane_strain(scene: &Scene) -> Result<Reduction, String> {
         "all bodies fill the width of {width} m along y, {ends}, and nothing pulls or moves along y; masses, forces and energies are \
          for a metre of depth: {width} times that is the scene's"
     );
-    Ok(Reduction { name: "plane strain", key: "space", space: Some(Space::PlaneStrain), edits, why })
+    Ok(Reduction { name: "plane strain", flat: Some(Flat { space: Space::PlaneStrain, why }), edits })
 }
 
 /// The plane at 0 across an axis mirrors the scene onto itself; or why not.
@@ -139,9 +143,7 @@ pub(super) fn mirrored(scene: &Scene, axis: usize) -> Result<Reduction, String> 
             edits.push(Edit::DropBody(number));
         }
     }
-    let why = format!("bodies with their velocities, walls and gravity are their own mirror images in {name} = 0");
-    let (name, key) = (super::PLANES[axis], "symmetry");
-    Ok(Reduction { name, key, space: None, edits, why })
+    Ok(Reduction { name: super::PLANES[axis], flat: None, edits })
 }
 
 fn no_ground_nor_sideways_pull(scene: &Scene, axes: &[usize]) -> Result<(), String> {
