@@ -263,7 +263,8 @@ fn near_symmetry_is_none() {
     not(&pair(["-0.3, 0, 0", "-0.2, 0.1, 0.1", "-1, 0, 0"], right), "body `left` has no mirror image");
     not(&pair(["-0.301, 0, 0", "-0.2, 0.1, 0.1", "1, 0, 0"], right), "body `left` has no mirror image");
     not(&pair(["-0.3, 0, 0", "-0.2, 0.1, 0.10000000000001", "1, 0, 0"], right), "body `left` has no mirror image");
-    let off = "[body.column]\ncylinder = { radius = 0.1, height = 0.2, base = [\"1 mm\", 0.3, 0] }\n[body.other]\nbox = { min = [0.2, 0, 0], max = [0.3, 0.1, 0.1] }\n";
+    let off = "[body.column]\ncylinder = { radius = 0.1, height = 0.2, base = [\"1 mm\", 0.3, 0] }\n\
+               [body.other]\nbox = { min = [0.2, 0, 0], max = [0.3, 0.1, 0.1] }\n";
     not(off, "body `column` has no mirror image");
     let middle = bin("pile", "-0.1, 0, 0", "0.1, 0.1, 0.1", "0, 0, 0");
     not(
@@ -336,7 +337,8 @@ fn sound_is_ten_times_as_fast_as_a_fall() {
     assert_eq!(speed(&fast), 42.3);
     // Down a slope to a wall: g_x counts along the way to it.
     let slope = format!("gravity = [3, 0, -9]\n{FLUID}");
-    let message = "scene.toml:6:15: material.visco-plastic.sound-speed: \"auto\" needs a bound of the speeds, and gravity acts along x";
+    let message = "scene.toml:6:15: material.visco-plastic.sound-speed: \"auto\" needs a bound of the speeds, and gravity \
+                   acts along x";
     bad(&slope, message);
     let stopped = slope + &wall("end", "x", "1 m", "below", "free-slip");
     // 2 (3 * 1 + 9 * 0.2) = 9.6.
@@ -362,6 +364,7 @@ fn runs_end_at_rest_where_they_can_come_to_rest() {
     };
     assert_eq!(at_rest(&scene(AUTO, &column(""))).0, Some(5e-5));
     assert_eq!(at_rest(FLUID).0, Some(5e-5));
+    is_none(&FLUID.replace("friction = 30", "friction = 0"), "it sloshes");
     is_none(&scene(AUTO, &(column("") + "velocity = [0, 0, 1]\n")), "moves up");
     is_none(
         &scene(

@@ -1,5 +1,5 @@
-//! What the program chose where a scene says `"auto"`: a short block before the particles are made, and whole sentences for
-//! `explain` and the provenance.
+//! What the program chose where a scene says `"auto"`: a short block before the particles are made, and whole sentences
+//! for `explain` and the provenance.
 
 use crate::{
     fill,
@@ -51,23 +51,22 @@ pub fn advice(scene: &Scene, smaller: Option<&Scene>) -> Option<String> {
     };
     let automatic = if scene.space == Space::ThreeD { "space" } else { "symmetry" };
     let less = short(saving.factor());
-    Some(format!(
-        "advice: this scene {what}: {change} would take {less} times fewer particle-steps; {automatic} = \"auto\" does so\n"
-    ))
+    let so = format!("{automatic} = \"auto\" does so");
+    Some(format!("advice: this scene {what}: {change} would take {less} times fewer particle-steps; {so}\n"))
 }
 
-/// What a stiffness that is just enough would save; for the law whose stiffness is a property of the material. `fastest` is the
-/// fastest motion that is to be expected, m/s.
+/// What a stiffness that is just enough would save; for the law whose stiffness is a property of the material.
+/// `fastest` is the fastest motion that is to be expected, m/s.
 pub fn softer(scene: &Scene, fastest: f64) -> Option<String> {
     let Material::DruckerPrager(law) = &scene.material else { return None };
     let times = scene.material.sound_speed() / (10.0 * fastest);
     let young = law.young / (times * times);
     (times >= 1.5 && fastest > 0.0).then(|| {
         format!(
-            "A Young's modulus of {:.2e} Pa would take {times:.1} times fewer steps, with sound still ten times as fast as the fall. It \
-             is a property of the material and never chosen for you: from a tenth to ten times the modulus heights of deposits moved by \
-             6 % at most, but run-outs by more than half, through the artificial viscosity (VALIDATION.md). Where run-outs count, \
-             compare two values.",
+            "A Young's modulus of {:.2e} Pa would take {times:.1} times fewer steps, with sound still ten times as fast \
+             as the fall. It is a property of the material and never chosen for you: from a tenth to ten times the modulus \
+             heights of deposits moved by 6 % at most, but run-outs by more than half, through the artificial viscosity \
+             (VALIDATION.md). Where run-outs count, compare two values.",
             young
         )
     })

@@ -1,5 +1,5 @@
-//! `space = "auto"` from the scene to the figures, and through a stop: the bits are those of the smaller scene written by hand, and
-//! the scene stays as its author wrote it.
+//! `space = "auto"` from the scene to the figures, and through a stop: the bits are those of the smaller scene written
+//! by hand, and the scene stays as its author wrote it.
 
 use formats::{exit, folder::RunFolder, provenance, snapshot};
 use std::path::PathBuf;
@@ -11,7 +11,8 @@ fn scene(head: &str, short: &str, bodies: &str) -> String {
     let material = &short[short.find("[material").unwrap()..short.find("[body").unwrap()];
     let floor = &short[short.find("[wall.floor]").unwrap()..];
     let floor = &floor[..floor.find("slip").unwrap()];
-    let rest = "slip = \"no-slip\"\n[initial]\njitter = 0.05\n[end]\ntime = \"100 ms\"\n[output]\nsnapshots = \"40 ms\"\nhistory = \"7 ms\"\n";
+    let rest = "slip = \"no-slip\"\n[initial]\njitter = 0.05\n[end]\ntime = \"100 ms\"\n\
+                [output]\nsnapshots = \"40 ms\"\nhistory = \"7 ms\"\n";
     format!("title = \"A scene\"\nspacing = \"20 mm\"\n{head}{material}{bodies}{floor}{rest}")
 }
 

@@ -1,5 +1,5 @@
-//! Edits of a parsed document: what somebody would change who writes the smaller scene by hand. Keys keep their places in the text,
-//! so that a fault of the edited document is told where its cause stands.
+//! Edits of a parsed document: what somebody would change who writes the smaller scene by hand. Keys keep their places
+//! in the text, so that a fault of the edited document is told where its cause stands.
 
 use crate::{scene::Scene, space::Space};
 use toml::{

@@ -1,11 +1,11 @@
 //! `"auto"` in a scene: the program chooses, and says what, why, and what it did not take.
 //!
 //! How data moves: the text is parsed once. Where it says `"auto"`, the document is read as the full description first
-//! (three dimensions, no planes of symmetry), with what follows from it alone (speed of sound, end) written in. Pure functions look
-//! at that scene and give the edits of the document that somebody would make who writes the smaller scene by hand
-//! ([`symmetry`]). The edited document is read and checked like any other: the scene that comes out is that of the text by
-//! hand, and where it has a fault the reduction is refused with that fault as the reason. All of it follows from the text,
-//! so that every program that reads it comes to the same scene.
+//! (three dimensions, no planes of symmetry), with what follows from it alone (speed of sound, end) written in. Pure
+//! functions look at that scene and give the edits of the document that somebody would make who writes the smaller
+//! scene by hand ([`symmetry`]). The edited document is read and checked like any other: the scene that comes out is
+//! that of the text by hand, and where it has a fault the reduction is refused with that fault as the reason. All of it
+//! follows from the text, so that every program that reads it comes to the same scene.
 
 mod edit;
 mod motion;
@@ -56,8 +56,8 @@ impl fmt::Display for Choice {
 }
 
 impl Chosen {
-    /// The choices that particles depend on, for the hash of a scene: a program that chooses otherwise must not go on with
-    /// them. Empty where none is.
+    /// The choices that particles depend on, for the hash of a scene: a program that chooses otherwise must not go on
+    /// with them. Empty where none is.
     pub(super) fn canonical(&self) -> String {
         let binding = self.choices.iter().filter(|choice| choice.binds);
         binding.map(|choice| format!("{} = {}\n", choice.key, choice.value)).collect()
@@ -65,8 +65,9 @@ impl Chosen {
 }
 
 impl Scene {
-    /// The scene that `"auto"` would make of one that names its space, where that is smaller: in fewer dimensions, or cut at
-    /// a plane of symmetry that the text says nothing about. None where nothing is gained, or the scene has faults.
+    /// The scene that `"auto"` would make of one that names its space, where that is smaller: in fewer dimensions, or
+    /// cut at a plane of symmetry that the text says nothing about. None where nothing is gained, or the scene has
+    /// faults.
     pub fn smaller(name: &str, text: &str, sources: &Sources) -> Option<Self> {
         let (mut document, errors) = DeTable::parse_recoverable(text);
         let space = text_at(document.get_ref(), &["space"])?.to_string();

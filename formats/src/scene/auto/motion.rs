@@ -1,6 +1,6 @@
 //! How fast a scene can become, and whether it comes to rest.
 
-use crate::scene::{InitialStress, Scene};
+use crate::scene::{InitialStress, Material, Scene};
 
 /// The speed of sound over the fastest motion: densities then vary by about 1 % (Monaghan 1994).
 pub(super) const TIMES_FASTEST: f64 = 10.0;
@@ -18,9 +18,9 @@ pub(super) struct Bound {
     pub why: String,
 }
 
-/// The fastest motion that is to be expected: what the first speed, the fall to the lowest place there is, and the pressure
-/// at the start can turn into, v^2 = v0^2 + 2 g H + 2 p/rho (Torricelli), and the speed of the walls besides. Or why there is no
-/// bound.
+/// The fastest motion that is to be expected: what the first speed, the fall to the lowest place there is, and the
+/// pressure at the start can turn into, v^2 = v0^2 + 2 g H + 2 p/rho (Torricelli), and the speed of the walls besides.
+/// Or why there is no bound.
 pub(super) fn fastest(scene: &Scene) -> Result<Bound, String> {
     let first = scene.bodies.iter().map(|body| speed(body.velocity)).fold(0.0, f64::max);
     let walls = scene.walls.iter().map(|wall| speed(wall.velocity)).fold(0.0, f64::max);
@@ -36,8 +36,8 @@ pub(super) fn fastest(scene: &Scene) -> Result<Bound, String> {
         let ground = scene.terrain.as_ref().filter(|_| axis == 2 && pull < 0.0).map(|t| t.ground.range()[0]);
         let Some(end) = facing.map(|wall| wall.at).or(ground) else {
             return Err(format!(
-                "\"auto\" needs a bound of the speeds, and gravity acts along {name} without a wall where it leads to; name ten times the \
-                 fastest motion"
+                "\"auto\" needs a bound of the speeds, and gravity acts along {name} without a wall where it leads to; \
+                 name ten times the fastest motion"
             ));
         };
         fall += pull.abs() * (farthest + pull.signum() * end).max(0.0);
@@ -75,7 +75,8 @@ pub(super) struct Rest {
     pub why: String,
 }
 
-/// Whether a scene can come to rest, and is at rest where its kinetic energy has gone. `flow` is what lets the material flow.
+/// Whether a scene can come to rest, and is at rest where its kinetic energy has gone. `flow` is what lets the material
+/// flow.
 pub(super) fn at_rest(scene: &Scene, flow: Option<&str>) -> Rest {
     let never = |why: String| Rest { fraction: None, why: format!("{why}: it runs to end.time") };
     let Some(flow) = flow else {
@@ -83,6 +84,14 @@ pub(super) fn at_rest(scene: &Scene, flow: Option<&str>) -> Rest {
             "it is held on every side and can only settle, and at each turn of an oscillation it stands still".into(),
         );
     };
+    let strength = match &scene.material {
+        Material::DruckerPrager(law) => law.friction_deg.max(law.cohesion),
+        Material::ViscoPlastic(law) => law.friction_deg.max(law.cohesion),
+        Material::MuI(law) => law.friction_static,
+    };
+    if strength == 0.0 {
+        return never("it has neither friction nor cohesion: it sloshes, and stands still at every turn".into());
+    }
     if scene.walls.iter().any(|wall| wall.velocity != [0.0; 3]) {
         return never("a wall moves and drives it".into());
     }

@@ -1,5 +1,6 @@
 //! Is a scene the same around an axis, along y, or on both sides of a plane? Numbers are the same or they are not: the
-//! tolerance is that of a few roundings, for "10 cm" against 0.1 and sums of corner and size, never a length that matters.
+//! tolerance is that of a few roundings, for "10 cm" against 0.1 and sums of corner and size, never a length that
+//! matters.
 
 use super::edit::Edit;
 use crate::{
@@ -179,7 +180,8 @@ fn cut(scene: &Scene, number: usize, axis: usize) -> Result<Vec<Edit>, String> {
     let body = &scene.bodies[number];
     let (low, high) = body.shape.bounds(scene.space);
     let component = |shape, key, value| Edit::Component { body: number, shape, key, axis, value };
-    // Sizes are rounded to whole spacings: with an odd number of rows one lies on the plane, where there are no particles.
+    // Sizes are rounded to whole spacings: with an odd number of rows one lies on the plane, where there are no
+    // particles.
     let rows = ((high[axis] - low[axis]) / scene.spacing).round();
     if !matches!(body.shape, Shape::Cylinder { .. }) && scene.initial.lattice == Lattice::Cubic && rows % 2.0 != 0.0 {
         let message = "spacings wide, an odd number: a row of its particles would lie on the plane";
