@@ -2,7 +2,7 @@
 
 use crate::scene::{InitialStress, Material, Scene};
 
-/// The speed of sound over the fastest motion: densities then vary by about 1 % (Monaghan 1994).
+/// The speed of sound over the fastest motion: the pressure of a flow then changes densities by about 1 % (Monaghan 1994).
 pub(super) const TIMES_FASTEST: f64 = 10.0;
 
 /// A run is over where the kinetic energy falls below this fraction of its peak: that of the columns in VALIDATION.md.
@@ -61,7 +61,7 @@ pub(super) fn fastest(scene: &Scene) -> Result<Bound, String> {
     let parts: Vec<_> =
         parts.iter().filter(|(_, speed)| *speed > 0.0).map(|(name, v)| format!("{name} {v:.3} m/s")).collect();
     let why = format!(
-        "{TIMES_FASTEST} times the fastest motion to be expected, {bound:.3} m/s ({}), so that densities vary by about 1 %",
+        "{TIMES_FASTEST} times the fastest motion to be expected, {bound:.3} m/s ({}), so that densities vary by 1 to 2 %",
         parts.join(", ")
     );
     Ok(Bound { speed: bound, why })
@@ -107,7 +107,8 @@ pub(super) fn at_rest(scene: &Scene, flow: Option<&str>) -> Rest {
     if let Some(body) = scene.bodies.iter().find(|body| rises(body.velocity)) {
         return never(format!("body `{}` moves up, and stands still where it turns", body.name));
     }
-    Rest { fraction: Some(AT_REST), why: format!("it can flow ({flow}) and comes to rest on its floor") }
+    let ends = if scene.material.is_fluid() { "creeps ever more slowly" } else { "comes to rest" };
+    Rest { fraction: Some(AT_REST), why: format!("it can flow ({flow}), and {ends} on its floor") }
 }
 
 fn speed(v: [f64; 3]) -> f64 {
