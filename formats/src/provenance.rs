@@ -56,6 +56,9 @@ pub struct Entry {
     pub ranks: usize,
     /// Name of the machine of rank 0.
     pub host: String,
+    /// What the program chose where the scene says `"auto"`, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub chosen: Vec<String>,
 }
 
 impl Entry {
@@ -68,6 +71,7 @@ impl Entry {
             time: now(),
             ranks,
             host: host(),
+            chosen: Vec::new(),
         }
     }
 }

@@ -175,6 +175,7 @@ fn the_least_scene_gets_all_defaults() {
         }],
         terrain: None,
         files: Vec::new(),
+        chosen: None,
         walls: vec![Wall {
             axis: 2,
             at: 0.0,
@@ -222,6 +223,7 @@ fn every_key_is_read() {
         ],
         terrain: None,
         files: Vec::new(),
+        chosen: None,
         walls: vec![
             Wall { axis: 0, at: 0.5, side: -1.0, slip: Slip::FreeSlip, kind: WallKind::Virtual, velocity: [0.0; 3] },
             Wall { axis: 2, at: 0.0, side: 1.0, slip: Slip::NoSlip, kind: WallKind::Virtual, velocity: [0.0; 3] },
@@ -342,7 +344,7 @@ fn values_of_the_wrong_kind() {
         "space",
         "did you mean `axisymmetric`? valid: plane-strain",
     );
-    bad(COLUMN, "\"axisymmetric\"", "2", (1, 9), "space", "\"3d\" is needed, not a number");
+    bad(COLUMN, "\"axisymmetric\"", "2", (1, 9), "space", "\"3d\", \"auto\" is needed, not a number");
     bad(COLUMN, "[end]", "[kernel]\nkind = \"cubic\"\n[end]", (21, 8), "kernel.kind", "unknown name `cubic`");
     bad(COLUMN, "[end]", "[[kernel]]\n[end]", (20, 1), "kernel", "a table is needed, not an array");
     bad(COLUMN, "spacing", "title = 3\nspacing", (2, 9), "title", "a string in quotes is needed, not a number");

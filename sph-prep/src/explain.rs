@@ -1,7 +1,7 @@
 //! `sph-prep explain scene.toml`: what a scene is, in plain words, what computing it takes, and what it leaves out.
 
 use crate::{
-    advice, fill,
+    advice, chosen, fill,
     lattice::Lattice,
     memory::Load,
     summary::{self, short, size},
@@ -23,14 +23,16 @@ pub struct Arguments {
 /// Longest line.
 const WIDTH: usize = 100;
 
-/// The whole text about a scene.
-pub fn text(scene: &Scene) -> String {
+/// The whole text about a scene; `smaller` is the advice on what it could spare.
+pub fn text(scene: &Scene, smaller: Option<&str>) -> String {
     let lattices = fill::lattices(scene);
     let parts = [
         ("What it is", what(scene)),
+        ("What was chosen", chosen::sentences(scene)),
         ("How it is computed", how(scene, &lattices)),
         ("What comes out", out(scene)),
         ("What it leaves out", without(scene)),
+        ("Advice", advices(scene, smaller)),
         ("Warnings", warnings(scene, &lattices)),
     ];
     let mut all = format!("{}\n", if scene.title.is_empty() { "A scene without a title" } else { &scene.title });
@@ -172,7 +174,11 @@ fn how(scene: &Scene, lattices: &[Lattice]) -> Vec<String> {
             short(2.0 * scene.h()),
             short(scene.h())
         ),
-        format!("Besides, about {} virtual particles stand for the walls at the start.", load.walls),
+        format!(
+            "Besides, about {} virtual particles stand for the walls at the start: only where material is within reach; of the terms of \
+             laws and stabilisers only those that the scene uses are computed.",
+            load.walls
+        ),
         format!(
             "About {steps} steps of {} s to {} s: a sound wave, {} m/s fast, may not cross {} h in one.",
             short(dt),
@@ -208,21 +214,28 @@ fn without(scene: &Scene) -> Vec<String> {
     match scene.space {
         Space::PlaneStrain => {
             say(
-                "Nothing moves or changes across the plane (y): side walls and three-dimensional flow are left out; masses, \
-                 forces and energies are for a metre of depth.",
+                "Nothing moves or changes across the plane (y): the friction of side walls, spreading across and three-dimensional \
+                 flow are left out; masses, forces and energies are for a metre of depth.",
             );
         }
         Space::Axisymmetric => {
-            say("All is the same around the axis: no swirl, no fingers, no wall beside it.");
+            say(
+                "All is the same around the axis, and the deposit round by construction: no swirl, no fingers, no wall beside it. \
+                 Near the axis the scheme is less accurate: the pressure dips there.",
+            );
         }
         Space::ThreeD => {}
     }
     match scene.symmetry.iter().filter(|s| **s).count() {
         0 => {}
-        1 => {
-            say("Half is computed, the other half is taken for its mirror image: what breaks the symmetry is left out.")
-        }
-        _ => say("A quarter is computed, the rest is taken for mirror images: what breaks the symmetry is left out."),
+        1 => say(
+            "Half is computed, the other half is taken for its mirror image: nothing moves across the plane between them, and what \
+             breaks the symmetry is left out.",
+        ),
+        _ => say(
+            "A quarter is computed, the rest is taken for mirror images: nothing moves across the planes between them, and what \
+             breaks the symmetry is left out.",
+        ),
     }
     say("Air, water and pore pressure; single grains, their shape, rolling and breaking.");
     if let Material::DruckerPrager(law) = &scene.material {
@@ -238,9 +251,7 @@ fn without(scene: &Scene) -> Vec<String> {
             say("A deposit at rest: below yield it is a stiff fluid, which goes on creeping.");
         }
     }
-    let top = scene.bodies.iter().map(|b| b.shape.bounds(scene.space).1[2]).fold(f64::NEG_INFINITY, f64::max);
-    let fall = (2.0 * speed(scene.gravity) * (top - scene.floor()).max(0.0)).sqrt();
-    let fastest = scene.bodies.iter().map(|b| speed(b.velocity)).fold(fall, f64::max);
+    let fastest = fastest(scene);
     let sound = scene.material.sound_speed();
     if fastest > 0.0 {
         say(&format!(
@@ -251,6 +262,18 @@ fn without(scene: &Scene) -> Vec<String> {
         ));
     }
     all
+}
+
+/// The speed of a fall from the highest point to the floor, or that of a body at the start, m/s.
+fn fastest(scene: &Scene) -> f64 {
+    let top = scene.bodies.iter().map(|b| b.shape.bounds(scene.space).1[2]).fold(f64::NEG_INFINITY, f64::max);
+    let fall = (2.0 * speed(scene.gravity) * (top - scene.floor()).max(0.0)).sqrt();
+    scene.bodies.iter().map(|b| speed(b.velocity)).fold(fall, f64::max)
+}
+
+fn advices(scene: &Scene, smaller: Option<&str>) -> Vec<String> {
+    let smaller = smaller.map(|advice| advice.trim().trim_start_matches("advice: ").to_owned() + ".");
+    smaller.into_iter().chain(chosen::softer(scene, fastest(scene))).collect()
 }
 
 fn warnings(scene: &Scene, lattices: &[Lattice]) -> Vec<String> {
@@ -286,7 +309,7 @@ time = "0.4 s"
 
     fn explained(space: &str, width: &str) -> String {
         let text = COLUMN.replace("SPACE", space).replace("WIDTH", width);
-        self::text(&Scene::read("scene", &text).unwrap())
+        self::text(&Scene::read("scene", &text).unwrap(), None)
     }
 
     #[test]
@@ -318,7 +341,7 @@ time = "0.4 s"
         let end = fluid.find("[body").unwrap();
         let with = |law: &str| {
             let text = fluid.replace(&fluid[begin..end], law);
-            self::text(&Scene::read("scene", &text).unwrap())
+            self::text(&Scene::read("scene", &text).unwrap(), None)
         };
         let mu = "[material.mu-i]\ndensity = 1500\nsound-speed = 20\nfriction-static = 0.38\nfriction-dynamic = 0.64\n\
                   inertial-number = 0.28\ngrain-diameter = 0.001\ngrain-density = 2500\n";

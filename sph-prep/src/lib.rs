@@ -4,6 +4,7 @@
 //! one file of all ranks. What the run costs is told, and refused, before anything is allocated. Failures are agreed upon after each part, so that all ranks leave together.
 
 pub mod advice;
+pub mod chosen;
 pub mod cli;
 pub mod explain;
 pub mod failure;
@@ -112,7 +113,9 @@ fn explain(words: impl IntoIterator<Item = OsString>) -> i32 {
     match scene {
         Ok(scene) => {
             // Whoever closed the pipe has read enough.
-            let _ = write!(std::io::stdout(), "{}", explain::text(&scene));
+            let smaller = Scene::smaller("", &text, &Sources::of(&arguments.scene));
+            let advice = chosen::advice(&scene, smaller.as_ref());
+            let _ = write!(std::io::stdout(), "{}", explain::text(&scene, advice.as_deref()));
             exit::DONE
         }
         Err(failure) => {
@@ -151,10 +154,14 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
     let ranks = comm.size() as u64;
     let lattices = fill::lattices(&scene);
     let estimate = Load::of(&scene, &lattices);
+    // Looked for only where somebody reads of it.
+    let smaller = if talks && !arguments.quiet { Scene::smaller(&name, text, &sources) } else { None };
+    let choices = || chosen::block(&scene) + &chosen::advice(&scene, smaller.as_ref()).unwrap_or_default();
     if let Err(failure) = memory::check(&scene, estimate, memory::room(comm), ranks) {
         // Even counting would take too long.
         says(summary::head(&scene, &summary::estimated(&scene, &lattices)));
         says(summary::cost(&scene, estimate, ranks));
+        says(choices());
         return Err(failure);
     }
 
@@ -165,6 +172,7 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
     }
     says(summary::head(&scene, &bodies));
     says(summary::cost(&scene, Load { particles: plan.total(), ..estimate }, ranks));
+    says(choices());
     if talks {
         let warnings = advice::warnings(&scene, &plan.lattices, &bodies);
         warnings.split_inclusive('\n').for_each(|warning| news::show(Level::Warning, warning));
@@ -221,7 +229,8 @@ fn write(
         let folder = staging.folder().clone();
         staging.write(&folder.scene(), text.as_bytes())?;
         sources.write(folder.path()).map_err(|error| Failure::output(folder.path(), &error))?;
-        provenance::append(&folder.provenance(), Entry::this("sph-prep", comm.size() as usize))?;
+        let entry = Entry { chosen: chosen::sentences(scene), ..Entry::this("sph-prep", comm.size() as usize) };
+        provenance::append(&folder.provenance(), entry)?;
         staging.publish()
     });
     agree(comm, finished)

@@ -46,5 +46,6 @@ pub fn scene(space: Space, spacing: f64, shape: Shape) -> Scene {
         },
         end: End { time: 1.0, at_rest: None },
         output: Output { snapshots: 0.05, history: 0.01 },
+        chosen: None,
     }
 }

@@ -2,7 +2,7 @@
 //! What concerns places (bodies, walls, planes of symmetry) is in [`super::geometry`].
 
 use super::{
-    End, Output, Scene, SceneError, Shape, geometry, held, initial, material, numerics, period,
+    End, Output, Scene, SceneError, Shape, auto, geometry, held, initial, material, numerics, period,
     raw::{Allowed, Faults, POSITIVE, Table, values},
     sources::Sources,
     terrain::{self, Terrain},
@@ -34,12 +34,36 @@ pub(super) struct Setting<'a> {
 
 /// Checks the text of a scene file. All faults are reported at once, in the order of the file.
 pub(super) fn scene(name: &str, text: &str, sources: &Sources) -> Result<Scene, SceneError> {
-    let faults = Faults::new(text);
     let (document, syntax_errors) = DeTable::parse_recoverable(text);
-    for error in &syntax_errors {
+    let mut document = document.into_inner();
+    let asked = auto::Asked::of(&document);
+    if !asked.nothing() && syntax_errors.is_empty() {
+        return auto::resolve(name, text, document, &asked, sources);
+    }
+    asked.describe(&mut document);
+    Ok(self::document(name, text, &document, &syntax_errors, sources)?.scene)
+}
+
+/// A checked scene.
+pub(super) struct Checked {
+    pub scene: Scene,
+    /// What lets the material flow, in words; None where it can only settle.
+    pub flow: Option<String>,
+}
+
+/// Checks a parsed document, in which nothing is left to the program to choose. Places are those in the text.
+pub(super) fn document(
+    name: &str,
+    text: &str,
+    document: &DeTable<'_>,
+    syntax_errors: &[toml::de::Error],
+    sources: &Sources,
+) -> Result<Checked, SceneError> {
+    let faults = Faults::new(text);
+    for error in syntax_errors {
         faults.syntax(error);
     }
-    let scene = read(Table::root(document.get_ref(), &faults), sources);
+    let scene = read(Table::root(document, &faults), sources);
     if scene.is_none() && faults.is_empty() {
         faults.add(0, "", "cannot be understood as a scene");
     }
@@ -50,7 +74,7 @@ pub(super) fn scene(name: &str, text: &str, sources: &Sources) -> Result<Scene, 
 }
 
 /// Reads every section before it gives up on any, so that no fault hides another.
-fn read(root: Table<'_>, sources: &Sources) -> Option<Scene> {
+fn read(root: Table<'_>, sources: &Sources) -> Option<Checked> {
     let (kernel, h_over_dx) = kernel(&root);
     let setting = setting(&root, h_over_dx, sources);
     let title = title(&root);
@@ -63,7 +87,7 @@ fn read(root: Table<'_>, sources: &Sources) -> Option<Scene> {
     // With a fault in a body or a wall nothing certain can be said.
     let flow = bodies.as_ref().zip(walls.as_ref()).and_then(|(b, w)| held::what_flows(b, w, &setting));
     let periodic = setting.periodic.iter().any(Option::is_some);
-    let place = numerics::Place { space: setting.space, kernel, h_over_dx, periodic, flow };
+    let place = numerics::Place { space: setting.space, kernel, h_over_dx, periodic, flow: flow.clone() };
     let numerics = numerics::read(&root, place, material.as_ref());
     let end = end(&root);
     let output = output(&root, end.as_ref());
@@ -71,7 +95,7 @@ fn read(root: Table<'_>, sources: &Sources) -> Option<Scene> {
 
     let bodies = bodies?;
     let names = || bodies.iter().map(|body| body.name.as_str()).collect::<Vec<_>>().join(", ");
-    Some(Scene {
+    let scene = Scene {
         title: title.unwrap_or_else(names),
         space: setting.space?,
         spacing: setting.spacing?,
@@ -89,11 +113,15 @@ fn read(root: Table<'_>, sources: &Sources) -> Option<Scene> {
         numerics: numerics?,
         end: end?,
         output: output?,
-    })
+        chosen: None,
+    };
+    Some(Checked { scene, flow })
 }
 
 fn setting<'a>(root: &Table<'_>, h_over_dx: f64, sources: &'a Sources) -> Setting<'a> {
-    let space = root.needed_choice("space", &Space::ALL.map(|space| (space.name(), space))).map(|found| found.value);
+    // "auto" has become one of the others by now; it is here for the list of what is valid.
+    let [plane, rings, three] = Space::ALL.map(|space| (space.name(), Some(space)));
+    let space = root.needed_choice("space", &[plane, rings, three, ("auto", None)]).and_then(|found| found.value);
     let spacing = root.needed("spacing", Dimension::Length, &POSITIVE).map(|found| found.value);
     let gravity = gravity(root, space);
     let symmetry = symmetry(root, space, gravity);

@@ -2,6 +2,7 @@
 //!
 //! [`Scene::read`] goes from text to a checked scene, or to the list of all its faults, each with line and column.
 
+mod auto;
 mod changes;
 mod check;
 mod error;
@@ -21,6 +22,7 @@ mod sources;
 mod terrain;
 mod walls;
 
+pub use auto::{Choice, Chosen};
 pub use changes::{Change, MAY_CHANGE};
 pub use error::{Fault, SceneError};
 pub use periodic_axis::PeriodicAxis;
@@ -69,6 +71,8 @@ pub struct Scene {
     pub end: End,
     /// What is written while it runs.
     pub output: Output,
+    /// What the program chose, where the text says `"auto"`; all else is the scene as it is run.
+    pub chosen: Option<Chosen>,
 }
 
 /// Constitutive law.
@@ -424,14 +428,15 @@ impl Scene {
         check::scene(name, text, sources)
     }
 
-    /// [`Scene::hash`] of its text, and of what the files hold that it names.
+    /// [`Scene::hash`] of its text, of what the files hold that it names, and of what was chosen where it says `"auto"`.
     pub fn hash_of(&self, text: &str) -> String {
         let hash = Self::hash(text);
-        if self.files.is_empty() {
+        let chosen = self.chosen.as_ref().map_or_else(String::new, Chosen::canonical);
+        if self.files.is_empty() && chosen.is_empty() {
             return hash;
         }
         let files: String = self.files.iter().map(|(path, digest)| format!("{path} {digest}\n")).collect();
-        crate::provenance::sha256(format!("{hash}\n{files}").as_bytes())
+        crate::provenance::sha256(format!("{hash}\n{files}{chosen}").as_bytes())
     }
 
     /// Smoothing length h, m.

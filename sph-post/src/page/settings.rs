@@ -23,7 +23,11 @@ pub fn scene(a: &Analysis) -> String {
         ("height at which basal stresses are taken", quantity(a.level, "m")),
         ("speed below which material is static", quantity(a.static_speed, "m/s")),
     ];
-    let derived: Vec<Vec<String>> = derived.into_iter().map(|(name, value)| vec![name.to_string(), value]).collect();
+    let derived = derived.into_iter().map(|(name, value)| vec![name.to_string(), value]);
+    let choices = a.scene.chosen.iter().flat_map(|chosen| &chosen.choices);
+    let chosen =
+        choices.map(|choice| vec![format!("chosen: {}", choice.key), format!("{}: {}", choice.value, choice.why)]);
+    let derived: Vec<Vec<String>> = chosen.chain(derived).collect();
     format!(
         "<h3>Keys that the scene sets</h3>\n{}<h3>What follows</h3>\n{}\
          <details>\n<summary>The scene file, SHA-256 {}</summary>\n<pre>{}</pre>\n</details>\n",
