@@ -211,7 +211,7 @@ fn power_law(points: &[(f64, f64)]) -> Option<[f64; 2]> {
 }
 
 /// Three digits.
-fn short(value: f64) -> String {
+pub fn short(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
     }
