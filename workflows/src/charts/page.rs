@@ -46,7 +46,8 @@ pub fn refresh(chart: &Chart, results: &Results, points: &Points) -> Result<Vec<
     Ok(written)
 }
 
-fn part(chart: &Chart, results: &Results, points: &Points) -> String {
+/// The part of a chart.
+pub fn part(chart: &Chart, results: &Results, points: &Points) -> String {
     let mut text = format!("Error: {}.", chart.error.words);
     if let Some(reference) = chart.error.reference {
         let _ = write!(
@@ -107,21 +108,14 @@ fn verdict(points: &Points) -> String {
             let _ = writeln!(text, "- The default is {words} with resolution {}.", found.join(", "));
         }
     }
-    for base in points.done.iter().filter(|p| p.is_base() && p.rank == Rank::Behind) {
-        if let Some(better) = best_instead(points, base) {
-            let _ = writeln!(
-                text,
-                "- With resolution {} it is dominated: *{}* has an error of {} ± {} in place of {} ± {} and takes {} s in place of {} s.",
-                base.resolution,
-                better.label(),
-                short(better.error[0]),
-                short(better.error[1]),
-                short(base.error[0]),
-                short(base.error[1]),
-                short(better.cost[0]),
-                short(base.cost[0]),
-            );
-        }
+    let behind = points.done.iter().filter(|p| p.is_base() && p.rank == Rank::Behind);
+    let pairs: Vec<(&Point, &Point)> = behind.filter_map(|p| Some((best_instead(points, p)?, p))).collect();
+    for group in pairs.chunk_by(|a, b| std::ptr::eq(a.0, b.0)) {
+        let better = group[0].0;
+        let of = |p: &Point| format!("{} ± {} in {} s", short(p.error[0]), short(p.error[1]), short(p.cost[0]));
+        let each = group.iter().map(|(_, base)| format!("with resolution {} {}", base.resolution, of(base)));
+        let each = each.collect::<Vec<_>>().join(", ");
+        let _ = writeln!(text, "- *{}* (an error of {}) dominates the default: {each}.", better.label(), of(better));
     }
     text
 }

@@ -11,6 +11,8 @@ use formats::disk;
 use std::path::PathBuf;
 
 const HEAD: &str = "first,second";
+/// So many options are combined, where there are so many.
+const LEAST: usize = 4;
 
 /// The file of a chart.
 pub fn path(chart: &Chart) -> PathBuf {
@@ -47,21 +49,15 @@ pub fn choose(chart: &mut Chart, results: &Results) -> Result<bool, Failure> {
     add_kept(chart)
 }
 
-/// Pairs of options that each lie on or next to the front of the single ones at the resolution of the pairs, the base among them. In the
-/// order of what they promise: error and cost, each over that of the base, multiplied, as if what two options do did not depend on
-/// each other. Not more than the chart wants; none of options that exclude each other or make no valid scene.
+/// Pairs of [`candidates`], in the order of what they promise: error and cost, each over that of the base, multiplied, as if what two
+/// options do did not depend on each other. Not more than the chart wants; none of options that exclude each other or make no
+/// valid scene.
 pub fn promising(chart: &Chart, points: &[Point]) -> Vec<[String; 2]> {
     let at = |point: &&Point| point.resolution == chart.pairs.resolution && !point.is_pair();
-    let mut single: Vec<Point> = points.iter().filter(at).cloned().collect();
-    points::rank(&mut single);
+    let single: Vec<Point> = points.iter().filter(at).cloned().collect();
     let Some(base) = single.iter().find(|point| point.setting == BASE).cloned() else { return Vec::new() };
     let gain = |point: &Point| (point.error[0] / base.error[0]).ln() + (point.cost[0] / base.cost[0]).ln();
-    let may = |point: &&Point| {
-        let is_alone = chart.option(&point.setting).is_none_or(|(_, option)| option.alone);
-        point.setting != BASE && point.rank != Rank::Behind && !is_alone
-    };
-    let mut options: Vec<&Point> = single.iter().filter(may).collect();
-    options.sort_by(|a, b| a.setting.cmp(&b.setting));
+    let options = candidates(chart, single);
     let mut pairs: Vec<(f64, [String; 2])> = Vec::new();
     for (k, first) in options.iter().enumerate() {
         for second in &options[k + 1..] {
@@ -71,4 +67,19 @@ pub fn promising(chart: &Chart, points: &[Point]) -> Vec<[String; 2]> {
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
     let fits = |pair: &[String; 2]| chart.pair(&pair[0], &pair[1]).is_ok();
     pairs.into_iter().map(|(_, pair)| pair).filter(fits).take(chart.pairs.most).collect()
+}
+
+/// Options that lie on or next to the front of the single ones at the resolution of the pairs, the base among them. Where they are fewer
+/// than four, also those of the front that is left without them, and so on. By name.
+fn candidates(chart: &Chart, mut single: Vec<Point>) -> Vec<Point> {
+    let is_alone = |point: &Point| chart.option(&point.setting).is_none_or(|(_, option)| option.alone);
+    let mut found: Vec<Point> = Vec::new();
+    while found.len() < LEAST && !single.is_empty() {
+        points::rank(&mut single);
+        let (behind, ahead): (Vec<Point>, Vec<Point>) = single.into_iter().partition(|p| p.rank == Rank::Behind);
+        found.extend(ahead.into_iter().filter(|point| !is_alone(point)));
+        single = behind;
+    }
+    found.sort_by(|a, b| a.setting.cmp(&b.setting));
+    found
 }

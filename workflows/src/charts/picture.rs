@@ -27,7 +27,7 @@ type Box4 = [f64; 4];
 
 /// Looks of base, options and pairs: shape of the marker, colour, and name.
 const LOOKS: [(usize, &str, &str); 3] = [
-    (3, INK, "the default setting, over the resolution"),
+    (3, INK, "default; dN: with resolution N"),
     (0, COLOURS[0], "one option changed"),
     (1, COLOURS[1], "two options changed"),
 ];
