@@ -30,6 +30,8 @@ pub struct Chart {
     pub study: Study,
     /// What counts.
     pub error: Error,
+    /// Columns of the table beside the error.
+    pub also: Vec<Named>,
     /// What is put into the place of the base.
     pub choices: Vec<Choice>,
     /// Of the combinations.
@@ -128,6 +130,8 @@ pub struct Reduction {
 struct Raw {
     title: String,
     measures: Vec<Named>,
+    #[serde(default)]
+    also: Vec<Named>,
     scene: Vec<String>,
     #[serde(default)]
     constants: Table,
@@ -229,6 +233,7 @@ impl Chart {
                 copies: Vec::new(),
             },
             error: raw.error,
+            also: raw.also,
             choices: raw.choices,
             pairs: raw.pairs,
             reduction: raw.reduction,
@@ -325,6 +330,9 @@ impl Chart {
             (is_measure || self.study.constants.iter().any(|(known, _)| known == name)).then_some(1.0)
         };
         expression::evaluate(&self.error.expression, &known).map_err(|e| format!("error: {e}"))?;
+        for column in &self.also {
+            expression::evaluate(&column.expression, &known).map_err(|e| format!("also: {e}"))?;
+        }
         if let Some(measured) = &self.study.numbers.profile {
             measured.read().map_err(|e| format!("profile: {e}"))?;
         }

@@ -26,7 +26,8 @@ pub fn write(chart: &Chart, points: &Points) -> Result<Option<PathBuf>, Failure>
 fn dataset(chart: &Chart, points: &Points) -> Dataset {
     let mut data = Dataset { time_chunk: 1, ..Dataset::default() };
     data.attribute("title", chart.study.title.as_str());
-    data.attribute("error", chart.error.words.as_str());
+    data.attribute("source", format!("Talus, ./talus {}", chart.study.words));
+    data.attribute("comment", format!("error: {}; processor: {}", chart.error.words, super::machine(chart)));
     if let Some(reference) = chart.error.reference {
         data.attribute("reference_uncertainty", reference);
     }
@@ -42,7 +43,7 @@ fn dataset(chart: &Chart, points: &Points) -> Dataset {
     let mut put = |name: &str, long: &str, unit: &str, values: Vec<f64>| {
         data.variable(Variable::new(name, Role::Data, &[OVER], long, unit, values));
     };
-    put("error", &chart.error.title, "1", of(&|p| p.error[0]));
+    put("error", chart.error.title.trim_end_matches(" [1]"), "1", of(&|p| p.error[0]));
     put("error_std", "standard deviation of the error over the lattices", "1", of(&|p| p.error[1]));
     put("cost_seconds", "processor time of the solver, mean over the lattices", "s", of(&|p| p.cost[0]));
     put("cost_seconds_std", "standard deviation of the processor time, 5 % at least", "s", of(&|p| p.cost[1]));

@@ -68,19 +68,22 @@ pub fn part(chart: &Chart, results: &Results, points: &Points) -> String {
     if !points.failed.is_empty() {
         let _ = writeln!(text, "Runs that ended with a numerical failure: {}.\n", points.failed.join("; "));
     }
-    text + "<details><summary>All settings</summary>\n\n" + &all(points) + "\n</details>\n"
+    text + "<details><summary>All settings</summary>\n\n" + &all(chart, points) + "\n</details>\n"
 }
 
-fn all(points: &Points) -> String {
-    let mut text = "| setting | choice | resolution | particles | lattices | error | processor time [s] | particle-steps [10⁶] | |\n\
-                    |---|---|---|---|---|---|---|---|---|\n"
-        .to_owned();
+fn all(chart: &Chart, points: &Points) -> String {
+    let also: String = chart.also.iter().map(|column| format!(" {} |", column.title)).collect();
+    let mut text = format!(
+        "| setting | choice | resolution | particles | lattices | error |{also} processor time [s] | particle-steps [10⁶] | |\n|{}\n",
+        "---|".repeat(9 + chart.also.len())
+    );
     for p in &points.done {
         let name = if p.is_base() { "**default**".to_owned() } else { p.setting.clone() };
         let mark = if p.stale { " †" } else { "" };
+        let also: String = p.also.iter().map(|value| format!(" {} |", short(*value))).collect();
         let _ = writeln!(
             text,
-            "| {name}{mark} | {} | {} | {} | {} | {} ± {} | {} | {} | {} |",
+            "| {name}{mark} | {} | {} | {} | {} | {} ± {} |{also} {} | {} | {} |",
             p.series,
             p.resolution,
             p.particles,

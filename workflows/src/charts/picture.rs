@@ -14,7 +14,7 @@ use crate::study::{
 /// Of the inside, pixels.
 const INSIDE: [f64; 2] = [560.0, 400.0];
 /// Room left of it, above it, right of it, and below it.
-const MARGIN: [f64; 4] = [80.0, 14.0, 290.0, 56.0];
+const MARGIN: [f64; 4] = [80.0, 14.0, 330.0, 56.0];
 /// Of a line of the legend.
 const LINE: f64 = 18.0;
 /// Of those that are not on the front.
@@ -43,8 +43,8 @@ pub fn png(chart: &Chart, points: &Points) -> Result<Vec<u8>, String> {
 
 fn draw(chart: &Chart, points: &Points) -> Paper {
     let front: Vec<&Point> = points.done.iter().filter(|point| point.rank == Rank::Front).collect();
-    let lines = front.len() + 8;
-    let height = (MARGIN[1] + INSIDE[1] + MARGIN[3]).max(MARGIN[1] + LINE * lines as f64 + 10.0);
+    let told = MARGIN[1] + LINE * (front.len() + 8) as f64 + 10.0;
+    let height = told.max(MARGIN[1] + INSIDE[1] + MARGIN[3]);
     let mut paper = Paper::new([MARGIN[0] + INSIDE[0] + MARGIN[2], height]);
     let x = Axis::new(points.done.iter().map(|p| p.cost[0]), true);
     let reference = chart.error.reference.filter(|r| points.done.iter().any(|p| p.error[0] < 1.5 * r));
@@ -59,14 +59,15 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
         let [left, at] = place(x.range[0], level);
         paper.line(&[[left, at], [left + INSIDE[0], at]], COLOURS[2], 1.4, "7 4");
     }
-    staircase(&mut paper, &front, &place, [&x, &y]);
+    let stairs = staircase(&front, &place, [&x, &y]);
+    paper.line(&stairs, COLOURS[4], 2.2, "");
     let base: Vec<[f64; 2]> =
         points.done.iter().filter(|p| p.is_base()).map(|p| place(p.cost[0], p.error[0])).collect();
     paper.line(&base, INK, 1.0, "3 3");
     // Pale ones first, so that those that matter lie above.
     let mut order: Vec<&Point> = points.done.iter().collect();
     order.sort_by_key(|point| (std::cmp::Reverse(point.rank), point.is_base()));
-    let mut taken: Vec<Box4> = Vec::new();
+    let (mut taken, mut lines): (Vec<Box4>, Vec<Box4>) = (Vec::new(), stairs.windows(2).map(around).collect());
     for point in &order {
         let at = place(point.cost[0], point.error[0]);
         let (shape, colour, _) = look(point);
@@ -75,6 +76,9 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
         let width = if point.rank == Rank::Front { 1.6 } else { 0.8 };
         paper.line(&ends, if is_pale { GRID } else { colour }, width, "");
         paper.marker(at, shape, if is_pale { PALE } else { colour });
+        if !is_pale {
+            lines.push(around(&ends));
+        }
         taken.push([at[0] - HALF, at[1] - HALF, at[0] + HALF, at[1] + HALF]);
     }
     let labels = front.iter().enumerate().map(|(k, point)| ((k + 1).to_string(), *point));
@@ -82,7 +86,9 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
     let all = labels.chain(sizes.map(|point| (format!("d{}", point.resolution), point)));
     for (text, point) in all {
         let at = place(point.cost[0], point.error[0]);
-        if let Some(corner) = free(&text, at, &taken) {
+        // Best where no line is either.
+        let clear = [&taken[..], &lines].concat();
+        if let Some(corner) = free(&text, at, &clear).or_else(|| free(&text, at, &taken)) {
             let middle = [0.5 * (corner[0] + corner[2]), 0.5 * (corner[1] + corner[3])];
             paper.text(&text, middle, Anchor::Middle);
             taken.push(corner);
@@ -111,21 +117,23 @@ fn frame(paper: &mut Paper, chart: &Chart, [x, y]: [&Axis; 2]) {
 }
 
 /// From the top at the cheapest to the right end at the best: nothing that was run lies left of it or below.
-fn staircase(paper: &mut Paper, front: &[&Point], place: &impl Fn(f64, f64) -> [f64; 2], [x, y]: [&Axis; 2]) {
+fn staircase(front: &[&Point], place: &impl Fn(f64, f64) -> [f64; 2], [x, y]: [&Axis; 2]) -> Vec<[f64; 2]> {
     let mut corners: Vec<[f64; 2]> = Vec::new();
     for point in front {
-        let from = corners.last().map_or(y.range[1], |_| f64::NAN);
         let here = place(point.cost[0], point.error[0]);
-        let above = match corners.last() {
-            Some(last) => [here[0], last[1]],
-            None => place(point.cost[0], from),
-        };
-        corners.extend([above, here]);
+        let above = corners.last().map_or(place(point.cost[0], y.range[1])[1], |last| last[1]);
+        corners.extend([[here[0], above], here]);
     }
-    if let Some(last) = corners.last().copied() {
-        corners.push([place(x.range[1], y.range[1])[0], last[1]]);
-        paper.line(&corners, COLOURS[4], 2.2, "");
+    if let Some(&[_, bottom]) = corners.last() {
+        corners.push([place(x.range[1], y.range[1])[0], bottom]);
     }
+    corners
+}
+
+/// What a line through two points takes.
+fn around(ends: &[[f64; 2]]) -> Box4 {
+    let [a, b] = [ends[0], ends[ends.len() - 1]];
+    [a[0].min(b[0]) - 1.0, a[1].min(b[1]) - 1.0, a[0].max(b[0]) + 1.0, a[1].max(b[1]) + 1.0]
 }
 
 /// Where a label beside a marker covers nothing: the first free of some places, none where all are taken.

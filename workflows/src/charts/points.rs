@@ -32,6 +32,8 @@ pub struct Point {
     pub cost: [f64; 2],
     /// Mean error, and its standard deviation.
     pub error: [f64; 2],
+    /// Means of what the chart's table has also.
+    pub also: Vec<f64>,
     /// Mean.
     pub particle_steps: f64,
     /// Particles.
@@ -54,9 +56,10 @@ pub struct Points {
 }
 
 impl Point {
-    /// `base, 12`.
+    /// `default, 12`.
     pub fn label(&self) -> String {
-        format!("{}, {}", self.setting, self.resolution)
+        let setting = if self.is_base() { "default" } else { &self.setting };
+        format!("{setting}, {}", self.resolution)
     }
 
     /// Is nothing in it changed?
@@ -101,6 +104,7 @@ pub fn of(chart: &Chart, results: &Results) -> Points {
             count: lines.len(),
             cost: [cost[0], cost[1].max(COST_SCATTER * cost[0])],
             error: mean_and_deviation(&errors),
+            also: chart.also.iter().map(|column| mean_and_deviation(&of(&column.expression))[0]).collect(),
             particle_steps: mean_and_deviation(&of(numbers::PARTICLE_STEPS))[0],
             particles: lines.iter().filter_map(|(_, line)| line.particles).max().unwrap_or(0),
             rank: Rank::Behind,
@@ -160,6 +164,7 @@ mod tests {
             count,
             cost: [1.0, 0.05],
             error,
+            also: Vec::new(),
             particle_steps: 1e6,
             particles: 100,
             rank: Rank::Behind,

@@ -1,6 +1,6 @@
 //! What a reduced model costs: the base and the options of a choice at one resolution, side by side; the last option is the full model.
 
-use super::definition::{BASE, Chart};
+use super::definition::Chart;
 use super::page::short;
 use crate::study::{
     definition::Run,
@@ -55,7 +55,7 @@ pub fn table(chart: &Chart, results: &Results) -> String {
         let _ = writeln!(
             text,
             "| {} | {} | {} | {} | {} | 1/{} |",
-            name.unwrap_or(BASE),
+            name.unwrap_or("default"),
             mean(name, "particles"),
             columns.join(" | "),
             short(distance(&of(name), &of(full))),

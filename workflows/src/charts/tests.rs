@@ -21,6 +21,7 @@ const CHART: &str = r#"
 title = "Made up"
 scene = ["t.toml", "sand.toml"]
 measures = ["runout"]
+also = ["run-out = runout"]
 [constants]
 r0 = 0.1
 law = 2
@@ -192,6 +193,7 @@ fn faults_name_their_place() {
     let work = tempfile::tempdir().unwrap();
     for (from, to, fault) in [
         ("title", "titel", "titel"),
+        ("= runout\"]", "= runin\"]", "also: `runin`: the name `runin` is not known"),
         ("law = 2", "", "error: `abs(runout/law - 1)`: the name `law` is not known"),
         ("name = \"step\"", "name = \"pairs\"", "choice pairs: this name is taken"),
         ("name = \"wide\"", "name = \"soft\"", "choice stiffness: option `soft`: another one has this name"),
@@ -261,8 +263,8 @@ fn settings_count_once_all_their_lattices_are_there() {
     assert_eq!((points.done.len(), points.missing), (5, 1));
     assert_eq!(points.failed, ["fluid, 10 (1 of 2)"]);
     let rank = |label: &str| points.done.iter().find(|point| point.label() == label).unwrap().rank;
-    assert_eq!([rank("soft, 10"), rank("base, 10"), rank("short, 10")], [Rank::Front; 3]);
-    assert_eq!([rank("wendland, 10"), rank("base, 20")], [Rank::Behind; 2]);
+    assert_eq!([rank("soft, 10"), rank("default, 10"), rank("short, 10")], [Rank::Front; 3]);
+    assert_eq!([rank("wendland, 10"), rank("default, 20")], [Rank::Behind; 2]);
 }
 
 #[test]
@@ -276,9 +278,9 @@ fn the_page_says_where_the_default_lies() {
     for line in [
         "Error: of the run-out.",
         "- The default is on the front with resolution 10.",
-        "- *wide, 10* (an error of 0.0500 ± 0 in 1.50 s) dominates the default: with resolution 20 0.0500 ± 0 in 9.00 s.",
-        "| **default** | base | 10 | 100 | 2 | 0.100 ± 0 | 1.00 | 1.00 | **front** |",
-        "| wendland | kernel | 10 | 100 | 2 | 0.200 ± 0 | 2.00 | 1.00 | dominated |",
+        "- *short, 10* (an error of 0.0100 ± 0 in 4.00 s) dominates the default: with resolution 20 0.0500 ± 0 in 9.00 s.",
+        "| **default** | base | 10 | 100 | 2 | 0.100 ± 0 | 2.20 | 1.00 | 1.00 | **front** |",
+        "| wendland | kernel | 10 | 100 | 2 | 0.200 ± 0 | 2.40 | 2.00 | 1.00 | dominated |",
     ] {
         assert!(text.lines().any(|l| l == line), "no {line}\n{text}");
     }
