@@ -3,7 +3,7 @@
 use super::{
     definition::{self, Chart, PAIRS},
     front::Rank,
-    page, pairs, points,
+    netcdf, page, pairs, picture, points,
 };
 use crate::{
     paths,
@@ -287,4 +287,22 @@ fn the_page_says_where_the_default_lies() {
     assert!(text.contains("7 settings. 14 of 14 runs, computed by abc, 2026-01-31."), "{text}");
     results.0.get_mut("law-fluid-resolution-10-seed-2").unwrap().exit = 70;
     assert!(part(&results).contains("numerical failure: fluid, 10 (1 of 2)."));
+}
+
+#[test]
+fn other_programs_find_the_points_in_a_file() {
+    let work = tempfile::tempdir().unwrap();
+    let chart = made_up(work.path(), CHART).unwrap();
+    let points = points::of(&chart, &with(&chart, &SINGLE));
+    let path = work.path().join("chart.nc");
+    netcdf::dataset(&chart, &points).write(&path).unwrap();
+    let of = |name: &str| formats::results::read(&path, name).unwrap();
+    assert_eq!(of("cost_seconds"), [0.5, 1.0, 1.2, 1.5, 2.0, 4.0, 9.0]);
+    assert_eq!(of("on_front"), [1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 0.0]);
+    assert_eq!(of("default_setting"), [0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    assert!((of("error")[0] - 0.15).abs() < 1e-12 && of("particle_steps")[6] == 1e6);
+    // The picture of a scatter of nothing, and of a single point, is a picture too.
+    assert!(picture::png(&chart, &points).unwrap().len() > 1000);
+    let one = points::of(&chart, &with(&chart, &SINGLE[..1]));
+    assert!(picture::png(&chart, &one).unwrap().len() > 1000);
 }
