@@ -44,6 +44,16 @@ pub fn ranks(places: &[Place]) -> Vec<Rank> {
     (0..places.len()).map(rank).collect()
 }
 
+/// Which points of the front are more accurate than a cheaper one of it by no more than the scatter.
+pub fn levels(places: &[Place], ranks: &[Rank]) -> Vec<bool> {
+    let on_front = |i: &usize| ranks[*i] == Rank::Front;
+    let as_good = |i: usize, j: usize| {
+        let (a, b) = (places[j], places[i]);
+        a.cost[0] < b.cost[0] && a.error[0] - b.error[0] <= a.error[1].hypot(b.error[1])
+    };
+    (0..places.len()).map(|i| on_front(&i) && (0..places.len()).filter(on_front).any(|j| as_good(i, j))).collect()
+}
+
 /// Not worse in both, better in one.
 fn dominates(a: &Place, b: &Place) -> bool {
     let (cost, error) = ([a.cost[0], b.cost[0]], [a.error[0], b.error[0]]);
@@ -87,5 +97,11 @@ mod tests {
         // As good, and clearly dearer.
         assert_eq!(rank(1.08, 2.0), Behind);
         assert_eq!(rank(0.5, 9.0), Front);
+        // The other way round: dearer, and more accurate by less or by more than that.
+        let level = |error: f64| {
+            let places = [better, Place { cost: [3.0, 0.0], error: [error, 0.4] }];
+            levels(&places, &ranks(&places))
+        };
+        assert_eq!((level(1.51), level(1.49)), (vec![false, true], vec![false, false]));
     }
 }

@@ -92,7 +92,7 @@ fn all(chart: &Chart, points: &Points) -> String {
             short(p.error[1]),
             short(p.cost[0]),
             short(1e-6 * p.particle_steps),
-            p.rank.word(),
+            p.word(),
         );
     }
     text

@@ -43,7 +43,7 @@ pub fn png(chart: &Chart, points: &Points) -> Result<Vec<u8>, String> {
 
 fn draw(chart: &Chart, points: &Points) -> Paper {
     let front: Vec<&Point> = points.done.iter().filter(|point| point.rank == Rank::Front).collect();
-    let told = MARGIN[1] + LINE * (front.len() + 8) as f64 + 10.0;
+    let told = MARGIN[1] + LINE * (front.len() + 9) as f64 + 10.0;
     let height = told.max(MARGIN[1] + INSIDE[1] + MARGIN[3]);
     let mut paper = Paper::new([MARGIN[0] + INSIDE[0] + MARGIN[2], height]);
     let x = Axis::new(points.done.iter().map(|p| p.cost[0]), true);
@@ -174,7 +174,11 @@ fn legend(paper: &mut Paper, front: &[&Point], reference: bool) {
     for (k, point) in front.iter().enumerate() {
         let y = next();
         paper.text(&format!("{}", k + 1), [left + 20.0, y], Anchor::End);
-        paper.text(&point.label(), [left + 26.0, y], Anchor::Start);
+        let mark = if point.level { "~ " } else { "" };
+        paper.text(&format!("{mark}{}", point.label()), [left + 26.0, y], Anchor::Start);
+    }
+    if front.iter().any(|point| point.level) {
+        paper.text("~ within the scatter of a cheaper one", [left + 26.0, next()], Anchor::Start);
     }
     if reference {
         let y = next();

@@ -41,6 +41,8 @@ pub struct Point {
     pub particles: u64,
     /// On the front?
     pub rank: Rank,
+    /// On the front, and better than a cheaper point of it by no more than the scatter?
+    pub level: bool,
     /// Has the scene of a run changed since?
     pub stale: bool,
 }
@@ -71,6 +73,11 @@ impl Point {
     /// Is it a combination?
     pub fn is_pair(&self) -> bool {
         self.series == PAIRS
+    }
+
+    /// For tables.
+    pub fn word(&self) -> &'static str {
+        if self.level { "front, ~ a cheaper one" } else { self.rank.word() }
     }
 
     fn place(&self) -> Place {
@@ -109,6 +116,7 @@ pub fn of(chart: &Chart, results: &Results) -> Points {
             particle_steps: mean_and_deviation(&of(numbers::PARTICLE_STEPS))[0],
             particles: lines.iter().filter_map(|(_, line)| line.particles).max().unwrap_or(0),
             rank: Rank::Behind,
+            level: false,
             stale: lines.iter().any(|(run, line)| line.scene != results::hash(run)),
         });
     }
@@ -121,8 +129,10 @@ pub fn of(chart: &Chart, results: &Results) -> Points {
 /// Ranks among these points alone.
 pub fn rank(points: &mut [Point]) {
     let places: Vec<Place> = points.iter().map(Point::place).collect();
-    for (point, rank) in points.iter_mut().zip(front::ranks(&places)) {
-        point.rank = rank;
+    let ranks = front::ranks(&places);
+    let levels = front::levels(&places, &ranks);
+    for (point, (rank, level)) in points.iter_mut().zip(ranks.into_iter().zip(levels)) {
+        (point.rank, point.level) = (rank, level);
     }
 }
 
@@ -169,6 +179,7 @@ mod tests {
             particle_steps: 1e6,
             particles: 100,
             rank: Rank::Behind,
+            level: false,
             stale: false,
         }
     }

@@ -6,20 +6,21 @@ use crate::study::{
     definition::Run,
     numbers::{self, station},
     results::Results,
-    table::Known,
+    table::{Known, mean_and_spread},
     template,
 };
 use std::fmt::Write as _;
 
 /// Columns beyond name, cost and profile: title and measure.
-const COLUMNS: [(&str, &str); 4] = [
+const COLUMNS: [(&str, &str); 5] = [
     ("run-out, 99.5 % of mass", "runout_mass_99_5"),
     ("height/r0", "height"),
+    ("V/V0", "volume_ratio"),
     ("basal force/weight", "basal_force_over_weight"),
     ("basal centre/largest", "basal_centre_ratio"),
 ];
 
-/// The table as Markdown; means over the lattices.
+/// The table as Markdown; means over the lattices, and their standard deviations.
 pub fn table(chart: &Chart, results: &Results) -> String {
     let Some(reduction) = &chart.reduction else { return String::new() };
     let Some(choice) = chart.choices.iter().find(|choice| choice.name == reduction.choice) else {
@@ -36,8 +37,11 @@ pub fn table(chart: &Chart, results: &Results) -> String {
         chart.study.runs.iter().filter(is).collect()
     };
     let known = Known { study: &chart.study, results };
+    let values = |name: Option<&str>, text: &str| -> Vec<f64> {
+        runs_of(name).iter().map(|run| known.value(run, None, text)).collect()
+    };
     let mean = |name: Option<&str>, text: &str| {
-        let values: Vec<f64> = runs_of(name).iter().map(|run| known.value(run, None, text)).collect();
+        let values = values(name, text);
         values.iter().sum::<f64>() / values.len() as f64
     };
     let full = names.last().copied().flatten();
@@ -47,7 +51,11 @@ pub fn table(chart: &Chart, results: &Results) -> String {
         "---|".repeat(COLUMNS.len() + 5)
     );
     for &name in &names {
-        let columns = COLUMNS.map(|(_, measure)| short(mean(name, measure)));
+        if runs_of(name).iter().any(|run| known.line(run).is_none()) {
+            let _ = writeln!(text, "| {} | not run |{}", name.unwrap_or("default"), " |".repeat(COLUMNS.len() + 3));
+            continue;
+        }
+        let columns = COLUMNS.map(|(_, measure)| mean_and_spread(&values(name, measure)));
         let of = |name: Option<&str>| -> Vec<f64> {
             (0..chart.study.numbers.stations.len()).map(|k| mean(name, &station(k))).collect()
         };
@@ -58,12 +66,17 @@ pub fn table(chart: &Chart, results: &Results) -> String {
             name.unwrap_or("default"),
             mean(name, "particles"),
             columns.join(" | "),
-            short(distance(&of(name), &of(full))),
+            or_dash(distance(&of(name), &of(full))),
             short(cost),
-            short(mean(full, numbers::PROCESSOR) / cost),
+            or_dash(mean(full, numbers::PROCESSOR) / cost),
         );
     }
     text
+}
+
+/// Not known where the full model has not been run.
+fn or_dash(value: f64) -> String {
+    if value.is_finite() { short(value) } else { "–".into() }
 }
 
 /// Root of the sum of the squares of the differences over that of the second.

@@ -179,7 +179,7 @@ fn means(known: &Known, table: &Tabulated, runs: &[&Run]) -> Vec<Vec<String>> {
 }
 
 /// Mean, and the standard deviation of the values (not of their mean), with one digit; none of a single value.
-fn mean_and_spread(values: &[f64]) -> String {
+pub fn mean_and_spread(values: &[f64]) -> String {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
