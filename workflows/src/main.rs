@@ -3,6 +3,7 @@
 mod batch;
 mod bench;
 mod cases;
+mod charts;
 mod failure;
 mod faults;
 mod gate;
@@ -79,6 +80,13 @@ enum Command {
         #[command(flatten)]
         options: study::Options,
     },
+    /// Chart error against cost of the choices a scene has, with the front of the best ones: docs/charts; list the charts.
+    Chart {
+        /// Folder under tests/charts; the charts are listed where none is named.
+        name: Option<String>,
+        #[command(flatten)]
+        options: study::Options,
+    },
     /// Measure what costs how much; writes tests/bench.
     Bench {
         #[command(subcommand)]
@@ -143,6 +151,8 @@ fn carry_out(command: Command) -> Result<(), Failure> {
         Command::Validate { names, ranks, reuse } => validate::all(&names, ranks, reuse),
         Command::Study { name: None, .. } => study::list(),
         Command::Study { name: Some(name), options } => study::carry_out(&name, &options),
+        Command::Chart { name: None, .. } => charts::list(),
+        Command::Chart { name: Some(name), options } => charts::carry_out(&name, &options),
         Command::Bench { bench } => bench::carry_out(&bench),
         Command::Scaling { options } => scaling::carry_out(&options),
         Command::Faults { options } => faults::carry_out(&options),

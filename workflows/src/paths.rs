@@ -38,6 +38,21 @@ pub fn page() -> PathBuf {
     repository().join("VALIDATION.md")
 }
 
+/// `tests/charts`.
+pub fn charts() -> PathBuf {
+    repository().join("tests").join("charts")
+}
+
+/// Run folders of a chart.
+pub fn chart_runs(chart: &str) -> PathBuf {
+    runs().join("charts").join(chart)
+}
+
+/// The page of the charts; their pictures lie beside it.
+pub fn charts_page() -> PathBuf {
+    repository().join("docs").join("charts").join("README.md")
+}
+
 /// A path of the command line: relative to where the user called, which the launcher leaves for the repository's root.
 pub fn from_caller(path: &Path) -> PathBuf {
     called_from().join(path)

@@ -70,7 +70,7 @@ pub fn write(page: &Path, text: &str) -> Result<PathBuf, Failure> {
 }
 
 /// The processor's name.
-fn processor() -> String {
+pub fn processor() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
     name.map_or_else(|| "unknown processor".into(), |(_, name)| name.trim().to_owned())

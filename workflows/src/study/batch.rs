@@ -4,6 +4,7 @@ use super::{
     Options,
     definition::{Run, Study},
     duration, expression,
+    numbers::PROCESSOR,
     results::{self, Line, Results},
 };
 use crate::{
@@ -34,20 +35,23 @@ pub fn run(study: &Study, results: &mut Results, options: &Options) -> Result<()
     queue.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
     queue.truncate(options.first.unwrap_or(usize::MAX));
     if queue.is_empty() {
-        eprintln!("talus: study {}: nothing is to do", study.name);
+        eprintln!("talus: {}: nothing is to do", study.words);
         return Ok(());
     }
     let all: f64 = queue.iter().map(|run| run.seconds).sum();
-    eprintln!("talus: study {}: {} runs, about {} on one rank", study.name, queue.len(), duration(all));
+    eprintln!("talus: {}: {} runs, about {} on one rank", study.words, queue.len(), duration(all));
     let programs = stage::Programs::build()?;
-    let folder = paths::study_runs(&study.name);
+    let folder = study.place.clone();
     std::fs::create_dir_all(&folder)
         .map_err(|e| Failure::cannot_write(format!("{}: cannot make the folder: {e}", folder.display())))?;
     let (count, failed) = (queue.len(), Mutex::new(0_usize));
     let queue: Mutex<VecDeque<(usize, &Run)>> = Mutex::new(queue.into_iter().enumerate().collect());
     let (results, ended) = (Mutex::new(results), Mutex::new(None));
+    let spent = Mutex::new(0.0_f64);
+    let budget = options.budget.map_or(f64::INFINITY, |budget| budget.as_secs_f64());
     let work = |programs: stage::Programs| -> Result<(), Failure> {
         while held(&ended).is_none()
+            && *held(&spent) < budget
             && let Some((number, run)) = take(&queue)
         {
             eprintln!("talus: [{}/{count}] {}, about {}", number + 1, run.name, duration(run.seconds));
@@ -64,6 +68,7 @@ pub fn run(study: &Study, results: &mut Results, options: &Options) -> Result<()
                     eprintln!("talus: [{}/{count}] {} failed with exit code {code}: see {log}", number + 1, run.name);
                 }
             }
+            *held(&spent) += line.measures.get(PROCESSOR).copied().unwrap_or_else(|| begun.elapsed().as_secs_f64());
             let mut results = held(&results);
             results.0.insert(run.name.clone(), line);
             results.write(study)?;
@@ -104,7 +109,7 @@ pub(super) fn is_to_do(run: &Run, line: Option<&Line>, commit: &str, reuse: bool
 }
 
 fn stopped(study: &Study) -> Failure {
-    let message = format!("stopped early; go on with: ./talus study {}, and the same options", study.name);
+    let message = format!("stopped early; go on with: ./talus {}, and the same options", study.words);
     Failure { code: exit::RESUMABLE, message }
 }
 
@@ -122,12 +127,12 @@ fn short(sources: &Sources) -> String {
 }
 
 fn folder(study: &Study, run: &Run) -> PathBuf {
-    paths::study_runs(&study.name).join(&run.name)
+    study.place.join(&run.name)
 }
 
 /// What the stages said.
 fn log(study: &Study, run: &Run) -> PathBuf {
-    paths::study_runs(&study.name).join(format!("{}.log", run.name))
+    study.place.join(format!("{}.log", run.name))
 }
 
 /// Is there a finished run of the scene as it is now?
@@ -146,11 +151,11 @@ fn one(
     options: &Options,
 ) -> Result<Line, Failure> {
     let (folder, log) = (folder(study, run), log(study, run));
-    let scene = paths::study_runs(&study.name).join(format!("{}.toml", run.name));
+    let scene = study.place.join(format!("{}.toml", run.name));
     disk::write_atomic(&scene, run.scene.as_bytes())
         .map_err(|e| Failure::cannot_write(format!("{}: {e}", scene.display())))?;
     let ranks = options.ranks.or((options.jobs > 1).then_some(1));
-    let again = format!("./talus study {}", study.name);
+    let again = format!("./talus {}", study.words);
     let job = stage::Job { scene: &scene, folder: &folder, ranks, fresh: false, again: &again, log: Some(&log) };
     let begun = |ranks| Record::begun(sources, &run.scene, ranks);
     let (record, ended) = match record::earlier(&folder, &run.scene, sources) {
@@ -175,7 +180,9 @@ fn one(
     };
     match ended {
         Ok(()) => {
-            let summary = measure::summary(&RunFolder::new(&folder).post())?;
+            let folder = RunFolder::new(&folder);
+            let mut summary = measure::summary(&folder.post())?;
+            study.numbers.add(&folder, &mut summary)?;
             line.particles = summary.get("particles").and_then(Json::as_u64);
             line.measures = measures(study, &summary);
         }

@@ -155,13 +155,15 @@ fn sampled([low, high]: [f64; 2], log: bool) -> Vec<f64> {
 
 /// An axis that holds some numbers.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
-    range: [f64; 2],
+pub struct Axis {
+    /// Its ends.
+    pub range: [f64; 2],
     log: bool,
 }
 
 impl Axis {
-    fn new(values: impl Iterator<Item = f64>, log: bool) -> Self {
+    /// With some room.
+    pub fn new(values: impl Iterator<Item = f64>, log: bool) -> Self {
         let ends = values.fold([f64::MAX, f64::MIN], |ends, v| [ends[0].min(v), ends[1].max(v)]);
         let range = match (log, ends) {
             (_, [low, high]) if low > high => [0.1, 1.0],
@@ -177,7 +179,7 @@ impl Axis {
     }
 
     /// Part of its way.
-    fn at(&self, value: f64) -> f64 {
+    pub fn at(&self, value: f64) -> f64 {
         let [low, high] = self.range;
         match self.log {
             true => (value / low).ln() / (high / low).ln(),
@@ -185,7 +187,8 @@ impl Axis {
         }
     }
 
-    fn ticks(&self) -> Vec<f64> {
+    /// Round numbers along it.
+    pub fn ticks(&self) -> Vec<f64> {
         let [low, high] = self.range;
         if self.log {
             let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;

@@ -3,6 +3,7 @@
 
 use super::{
     cost, expression,
+    numbers::Numbers,
     reference::{self, Reference},
     template::{self, Value, tidy},
 };
@@ -19,6 +20,10 @@ pub struct Study {
     pub name: String,
     /// The folder.
     pub folder: PathBuf,
+    /// The words of the command line that carry it out: `study columns`.
+    pub words: String,
+    /// Where its run folders lie.
+    pub place: PathBuf,
     /// One line.
     pub title: String,
     /// Names of the series, in order.
@@ -29,6 +34,8 @@ pub struct Study {
     pub constants: Vec<(String, Value)>,
     /// What is kept of each run.
     pub measures: Vec<Named>,
+    /// What measures may name beyond the keys of `summary.json`.
+    pub numbers: Numbers,
     /// Curves to compare with.
     pub references: Vec<Reference>,
     /// All runs of all series.
@@ -226,6 +233,30 @@ pub fn names() -> Result<Vec<String>, Failure> {
     Ok(names)
 }
 
+impl Run {
+    /// The run of a series with these parameters: the template `text` with each of `sets` laid over it, checked.
+    pub fn new(
+        series: &str,
+        text: &str,
+        sets: &[&Table],
+        parameters: Vec<(String, Value)>,
+        constants: &[(String, Value)],
+    ) -> Result<Self, String> {
+        let name = parameters.iter().fold(series.to_owned(), |name, (key, value)| match value {
+            Value::Text(text) => format!("{name}-{text}"),
+            Value::Number(_) => format!("{name}-{key}-{value}"),
+        });
+        let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '.' || c == '_';
+        if let Some(odd) = name.chars().find(|&c| !fits(c)) {
+            return Err(format!("`{name}` would be a folder's name, where `{odd}` is not wanted"));
+        }
+        let values: Vec<_> = parameters.iter().chain(constants).cloned().collect();
+        let scene = template::scene(text, sets, &values).map_err(|e| format!("{name}: {e}"))?;
+        let checked = Scene::read(&name, &scene).map_err(|e| format!("{name}: {e}"))?;
+        Ok(Self { name, series: series.to_owned(), parameters, scene, seconds: cost::seconds(&checked) })
+    }
+}
+
 impl Study {
     /// Reads the study of a name.
     pub fn named(name: &str) -> Result<Self, Failure> {
@@ -247,11 +278,14 @@ impl Study {
         let mut study = Self {
             name: name.to_owned(),
             folder: folder.to_owned(),
+            words: format!("study {name}"),
+            place: paths::study_runs(name),
             title: raw.title,
             series: raw.series.iter().map(|series| series.name.clone()).collect(),
             parameters: Vec::new(),
             constants,
             measures: raw.measures,
+            numbers: Numbers::default(),
             references: Vec::new(),
             runs: Vec::new(),
             tables: raw.table,
@@ -324,18 +358,7 @@ impl Study {
         parameters: Vec<(String, Value)>,
         variant: &Table,
     ) -> Result<Run, String> {
-        let name = parameters.iter().fold(series.name.clone(), |name, (key, value)| match value {
-            Value::Text(text) => format!("{name}-{text}"),
-            Value::Number(_) => format!("{name}-{key}-{value}"),
-        });
-        let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '.' || c == '_';
-        if let Some(odd) = name.chars().find(|&c| !fits(c)) {
-            return Err(format!("`{name}` would be a folder's name, where `{odd}` is not wanted"));
-        }
-        let values: Vec<_> = parameters.iter().chain(&self.constants).cloned().collect();
-        let scene = template::scene(text, &[&series.set, variant], &values).map_err(|e| format!("{name}: {e}"))?;
-        let checked = Scene::read(&name, &scene).map_err(|e| format!("{name}: {e}"))?;
-        Ok(Run { name, series: series.name.clone(), parameters, scene, seconds: cost::seconds(&checked) })
+        Run::new(&series.name, text, &[&series.set, variant], parameters, &self.constants)
     }
 
     /// Does every expression, series and reference in it exist?
@@ -444,7 +467,8 @@ fn as_number(value: &toml::Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|n| n as f64))
 }
 
-fn value(value: &toml::Value) -> Result<Value, String> {
+/// Number or text of a table.
+pub fn value(value: &toml::Value) -> Result<Value, String> {
     match (as_number(value), value.as_str()) {
         (Some(number), _) => Ok(Value::Number(tidy(number))),
         (_, Some(text)) => Ok(Value::Text(text.to_owned())),

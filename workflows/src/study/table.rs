@@ -179,7 +179,7 @@ fn means(known: &Known, table: &Tabulated, runs: &[&Run]) -> Vec<Vec<String>> {
 }
 
 /// Mean, and the standard deviation of the values (not of their mean), with one digit; none of a single value.
-fn mean_and_spread(values: &[f64]) -> String {
+pub fn mean_and_spread(values: &[f64]) -> String {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
@@ -211,7 +211,7 @@ fn power_law(points: &[(f64, f64)]) -> Option<[f64; 2]> {
 }
 
 /// Three digits.
-fn short(value: f64) -> String {
+pub fn short(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
     }

@@ -58,7 +58,7 @@ pub struct Run {
 
 /// Final thickness over the distance from the origin.
 #[derive(Debug, PartialEq)]
-struct Profile(Vec<[f64; 2]>);
+pub struct Profile(Vec<[f64; 2]>);
 
 const FRONT_THICKNESS: f64 = 0.003;
 
@@ -141,7 +141,7 @@ fn overview_of(summary: &Value, spacing: f64) -> Overview {
 impl Profile {
     /// Reads a CSV file of `x,h` lines, or of `curve,x,h` lines of which one curve is taken.
     /// Lines that start with `#` are remarks, the first other line is the heading.
-    fn read(path: &Path, curve: Option<&str>) -> Result<Self, Failure> {
+    pub fn read(path: &Path, curve: Option<&str>) -> Result<Self, Failure> {
         let fault = |e: String| Failure::no_input(format!("{}: {e}", crate::paths::short(path).display()));
         let text = std::fs::read_to_string(path).map_err(|e| fault(e.to_string()))?;
         Self::parse(&text, curve).map_err(fault)
@@ -171,7 +171,7 @@ impl Profile {
 
     /// Thickness at x, m: linear between points, the first one's before it, zero beyond the last.
     /// Bins without material (not-a-number) count as zero.
-    fn at(&self, x: f64) -> f64 {
+    pub fn at(&self, x: f64) -> f64 {
         let thickness = |i: usize| if self.0[i][1].is_nan() { 0.0 } else { self.0[i][1] };
         let right = self.0.partition_point(|point| point[0] < x);
         if right == 0 {
@@ -186,13 +186,18 @@ impl Profile {
     }
 
     /// Pd of Bui et al.'s profiles: distance to a measured surface, relative to it.
-    fn distance(&self, reference: &Self) -> f64 {
+    pub fn distance(&self, reference: &Self) -> f64 {
         let (mut above, mut below) = (0.0, 0.0);
         for &[x, h] in &reference.0 {
             above += (self.at(x) - h).powi(2);
             below += h * h;
         }
         (above / below).sqrt()
+    }
+
+    /// All lengths times `factor`.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self(self.0.into_iter().map(|point| point.map(|length| factor * length)).collect())
     }
 
     /// Furthest place, m, up to which the layer from the origin on is at least `thickness` thick.
