@@ -9,6 +9,7 @@ use crate::{
     field::Field,
     flow::{Flow, StaticSpeed},
     geometry::Geometry,
+    health::{Gatherer as Watch, Health},
     history::History,
     layers::Layers,
     partition::Partition,
@@ -118,6 +119,8 @@ pub struct Analysis {
     pub maps: Option<Maps>,
     /// Where the energy went, if the history tells.
     pub partition: Option<Partition>,
+    /// How sound it is.
+    pub health: Health,
 }
 
 impl Analysis {
@@ -155,13 +158,16 @@ impl Analysis {
         let colours = &choices.colours[..];
         let mut moments = Vec::with_capacity(files.len());
         let mut maps = Gatherer::new(&scene);
+        let mut watch = Watch::default();
         for (number, (_, file)) in files.iter().enumerate() {
             let inside = sections.contains(&number);
             let drawn = inside || shown.contains(&number) || failure == Some(number);
             let wanted = Wanted { level, static_speed, layers: layers.as_ref(), inside, drawn, grains, colours };
-            moments.push(moment(&scene, &geometry, file, &wanted, maps.as_mut())?);
+            watch.is_last = number + 1 == files.len();
+            moments.push(moment(&scene, &geometry, file, &wanted, maps.as_mut(), &mut watch)?);
         }
         let maps = maps.map(Gatherer::finish);
+        let health = watch.health;
         let history = History::read(folder, &index)?;
         let partition = history.as_ref().and_then(Partition::of);
         Ok(Self {
@@ -182,6 +188,7 @@ impl Analysis {
             history,
             maps,
             partition,
+            health,
         })
     }
 
@@ -228,6 +235,7 @@ fn moment(
     file: &Path,
     wanted: &Wanted,
     maps: Option<&mut Gatherer>,
+    watch: &mut Watch,
 ) -> Result<Moment, Failure> {
     let (header, rows) = snapshot::read(file)?;
     if let Some(maps) = maps {
@@ -238,6 +246,7 @@ fn moment(
     let sampler = Sampler::new(geometry, &rows);
     let deposit = Deposit::new(geometry, &rows, &sampler);
     let basal = Basal::new(geometry, &rows, &sampler, &deposit, wanted.level);
+    watch.add(scene, geometry, &rows, &sampler, wanted.static_speed);
     let section = Section::new(geometry, &rows, &sampler, &deposit.profile);
     let layers = wanted.layers.filter(|layers| layers.are_of(&rows));
     let plane = section::plane(geometry, &rows);
