@@ -1,18 +1,18 @@
 //! `study`: families of runs over parameters, kept as one line a run in `tests/validation/<study>/results.csv`, and shown in
 //! VALIDATION.md. The keys of `study.toml` are told in `tests/validation/README.md`.
 
-mod batch;
+pub mod batch;
 mod chart;
-mod cost;
+pub mod cost;
 mod coverage;
-mod definition;
-mod expression;
-mod page;
+pub mod definition;
+pub mod expression;
+pub mod page;
 pub mod paper;
 mod reference;
-mod results;
-mod table;
-mod template;
+pub mod results;
+pub mod table;
+pub mod template;
 #[cfg(test)]
 mod tests;
 
@@ -25,25 +25,25 @@ use results::Results;
 pub struct Options {
     /// Only these series.
     #[arg(long, value_name = "SERIES", value_delimiter = ',')]
-    only: Vec<String>,
+    pub only: Vec<String>,
     /// Keep results that other sources computed from the same scene.
     #[arg(long)]
-    reuse: bool,
+    pub reuse: bool,
     /// MPI ranks of each run; one where several run at a time, else as many as the scene can feed.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
-    ranks: Option<u32>,
+    pub ranks: Option<u32>,
     /// Runs at a time.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..), default_value_t = 1)]
-    jobs: u32,
+    pub jobs: u32,
     /// Only so many of the runs that are to do: the cheapest ones.
     #[arg(long, value_name = "N")]
-    first: Option<usize>,
+    pub first: Option<usize>,
     /// Run nothing: tables and pictures from the results that are kept.
     #[arg(long, conflicts_with_all = ["evaluate", "first"])]
-    draw: bool,
+    pub draw: bool,
     /// Run nothing new: sph-post again on the run folders that are done, for measures that are new.
     #[arg(long, conflicts_with = "first")]
-    evaluate: bool,
+    pub evaluate: bool,
 }
 
 /// Prints the studies, and how much of each is done.
