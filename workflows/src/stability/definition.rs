@@ -190,7 +190,9 @@ impl Map {
             rows.push(row);
         }
         for row in &rows {
-            row.check_shared(&rows).map_err(|e| Failure::no_input(format!("{}.toml: {e}", row.name)))?;
+            let path = folder.join(format!("{}.toml", row.name));
+            let fault = |e: String| Failure::no_input(format!("{}: {e}", paths::short(&path).display()));
+            row.check_shared(&rows).map_err(fault)?;
         }
         let measures = keys.into_iter().map(Named::from).collect();
         let study = Study {
@@ -247,9 +249,7 @@ impl Row {
 
     /// With `runs_of`: are there such runs?
     fn check_shared(&self, rows: &[Self]) -> Result<(), String> {
-        let Some(name) = &self.runs_of else {
-            return if self.scene.is_empty() { Err("scene: it is missing".into()) } else { Ok(()) };
-        };
+        let Some(name) = &self.runs_of else { return Ok(()) };
         let other = rows.iter().find(|row| row.name == *name && row.runs_of.is_none());
         let other = other.ok_or_else(|| format!("runs_of: there is no row `{name}` with runs of its own"))?;
         if !self.scene.is_empty() || !self.material.is_empty() || !self.set.is_empty() {
@@ -269,6 +269,9 @@ impl Row {
         let of_file = self.name.get(1..3).and_then(|digits| digits.parse::<u32>().ok());
         if !self.name.starts_with('f') || of_file != Some(self.failure) {
             return Err(format!("failure: the name of a file with F{} begins with f{:02}", self.failure, self.failure));
+        }
+        if self.scene.is_empty() && self.runs_of.is_none() {
+            return Err("scene: it is missing; or name the row whose runs these are in runs_of".into());
         }
         if !(self.holds.is_finite() && self.degrades.is_finite() && self.holds != self.degrades) {
             return Err("holds, degrades: two different numbers, for something must lie between".into());
