@@ -197,15 +197,15 @@ fn deepest(scene: &Scene, g: &Geometry, rows: &Rows) -> f64 {
 
 /// Along the axis, from 2h above the lowest particle within 4h of it to 2h below the highest one.
 fn void(g: &Geometry, rows: &Rows, sampler: &Sampler) -> f64 {
-    if !g.radial || rows.len() == 0 {
+    if !g.radial || rows.is_empty() {
         return f64::NAN;
     }
     let heights = || rows.position.iter().filter(|x| g.along(**x) < 4.0 * g.h).map(|x| x[2]);
     let low = heights().fold(f64::INFINITY, f64::min) + 2.0 * g.h;
     let high = heights().fold(f64::NEG_INFINITY, f64::max) - 2.0 * g.h;
     let count = ((high - low) / g.dx).floor();
-    // Not a number, or nothing between.
-    if !(count >= 0.0) {
+    // Nothing there, or nothing between.
+    if count.is_nan() || count < 0.0 {
         return f64::NAN;
     }
     let points = 0..=count as usize;

@@ -102,7 +102,7 @@ pub fn cell(map: &Map, results: &Results, row: &Row, method: &str) -> Cell {
 pub fn short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),
-        v if v >= 9950.0 || v < 1e-3 => format!("{value:.0e}"),
+        v if !(1e-3..9950.0).contains(&v) => format!("{value:.0e}"),
         v if v >= 9.95 => format!("{value:.0}"),
         v => {
             // Rounded first: 0.0996 is 0.10, with as many digits as 0.12.
