@@ -98,17 +98,19 @@ pub fn cell(map: &Map, results: &Results, row: &Row, method: &str) -> Cell {
     }
 }
 
-/// A number with two digits, short enough for a cell.
+/// A number short enough for a cell of the picture.
 pub fn short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),
-        v if !(1e-3..9950.0).contains(&v) => format!("{value:.0e}"),
-        v if v >= 9.95 => format!("{value:.0}"),
-        v => {
-            // Rounded first: 0.0996 is 0.10, with as many digits as 0.12.
-            let rounded: f64 = format!("{v:.1e}").parse().unwrap_or(v);
-            let digits = (1.0 - rounded.log10().floor()).max(0.0) as usize;
-            format!("{value:.digits$}")
-        }
+        v if !(0.00995..9950.0).contains(&v) => format!("{value:.0e}"),
+        v if v >= 99.5 => format!("{value:.0}"),
+        v if v >= 9.95 => format!("{value:.1}"),
+        v if v >= 0.0995 => format!("{value:.2}"),
+        _ => format!("{value:.3}"),
     }
+}
+
+/// Three digits, for tables.
+pub fn three(value: f64) -> String {
+    results::significant(format!("{value:.2e}").parse().unwrap_or(value))
 }

@@ -2,7 +2,7 @@
 
 use super::{
     definition::{Map, Row},
-    judge::{Cell, Verdict, cell, short},
+    judge::{Cell, Verdict, cell, three},
     picture,
 };
 use crate::{
@@ -78,7 +78,7 @@ pub fn section(map: &Map, results: &Results, row: &Row) -> String {
             Cell::ToDo => "to do".into(),
             Cell::NoValue => "no value".into(),
             Cell::Broke => "broke down (70)".into(),
-            Cell::Judged(_, value) => short(value),
+            Cell::Judged(_, value) => three(value),
         };
         let _ = writeln!(text, "| {} | {value} | {} |", method.title, cell.verdict().map_or("", Verdict::word));
     }

@@ -1,6 +1,6 @@
 use super::{
     definition::{FAILURES, KEYS, Map, Row},
-    judge::{Cell, Verdict, cell, short, verdict},
+    judge::{Cell, Verdict, cell, short, three, verdict},
     page, picture,
 };
 use crate::{
@@ -211,7 +211,7 @@ fn the_page_has_a_table_for_each_row_and_the_picture_a_cell_for_each_pair() {
     for wanted in [
         "### F3: noise (`f03-noise`)",
         "`twice*stress_noise`; holds ≤ 0.1, degrades ≤ 0.4, else fails.",
-        "| as it is | 0.060 | holds |",
+        "| as it is | 0.06 | holds |",
         "| short steps | broke down (70) | **fails** |",
     ] {
         assert!(text.lines().any(|line| line.contains(wanted)), "{wanted}\n{text}");
@@ -232,16 +232,18 @@ fn numbers_are_short() {
         (0.0, "0"),
         (0.059_96, "0.060"),
         (0.0996, "0.10"),
-        (1.0, "1.0"),
-        (9.96, "10"),
+        (1.244, "1.24"),
+        (9.96, "10.0"),
         (-0.34, "-0.34"),
         (123.4, "123"),
+        (-1.03e-3, "-1e-3"),
         (2.3e-5, "2e-5"),
         (1.2e6, "1e6"),
     ] {
         assert_eq!(short(value), text, "{value}");
         assert!(text.len() <= 6);
     }
+    assert_eq!([1.244_56, 0.0, 4.191e-5, -0.034_449].map(three), ["1.24", "0", "4.19e-5", "-0.0344"]);
 }
 
 /// The map that is kept.
