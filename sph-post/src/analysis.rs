@@ -9,6 +9,7 @@ use crate::{
     field::Field,
     flow::{Flow, StaticSpeed},
     geometry::Geometry,
+    health::{Health, Start},
     history::History,
     layers::Layers,
     partition::Partition,
@@ -119,6 +120,8 @@ pub struct Analysis {
     pub maps: Option<Maps>,
     /// Where the energy went, if the history tells.
     pub partition: Option<Partition>,
+    /// How sound it is.
+    pub health: Health,
 }
 
 impl Analysis {
@@ -159,11 +162,17 @@ impl Analysis {
         let evaluated = workers::each(&files, particles, |number, (_, file)| {
             let inside = sections.contains(&number);
             let drawn = inside || shown.contains(&number) || failure == Some(number);
-            let wanted = Wanted { level, static_speed, layers: layers.as_ref(), inside, drawn, grains, colours };
+            let first = (number + 1 == files.len()).then_some(&files[0].1);
+            let wanted = Wanted { level, static_speed, layers: layers.as_ref(), inside, drawn, grains, colours, first };
             moment(&scene, &geometry, file, &wanted, gatherer.as_ref())
         })?;
-        let (moments, layers_on_ground): (Vec<Moment>, Vec<_>) = evaluated.into_iter().unzip();
-        let maps = gatherer.map(|gatherer| gatherer.maps(layers_on_ground.into_iter().flatten().collect()));
+        let (mut moments, mut on_ground, mut health) = (Vec::new(), Vec::new(), Health::default());
+        for (moment, layer, seen) in evaluated {
+            moments.push(moment);
+            on_ground.extend(layer);
+            health = health.and_then(seen);
+        }
+        let maps = gatherer.map(|gatherer| gatherer.maps(on_ground));
         let history = History::read(folder, &index)?;
         let partition = history.as_ref().and_then(Partition::of);
         Ok(Self {
@@ -184,6 +193,7 @@ impl Analysis {
             history,
             maps,
             partition,
+            health,
         })
     }
 
@@ -222,6 +232,8 @@ struct Wanted<'a> {
     drawn: bool,
     grains: Option<Grains>,
     colours: &'a [&'static Field],
+    /// The first snapshot, of the last one.
+    first: Option<&'a PathBuf>,
 }
 
 fn moment(
@@ -230,7 +242,7 @@ fn moment(
     file: &Path,
     wanted: &Wanted,
     gatherer: Option<&Gatherer>,
-) -> Result<(Moment, Option<terrain::Layer>), Failure> {
+) -> Result<(Moment, Option<terrain::Layer>, Health), Failure> {
     let (header, rows) = snapshot::read(file)?;
     let on_ground = gatherer.map(|gatherer| gatherer.layer(header.time, &rows));
     let energy = Energy::new(geometry, &rows);
@@ -238,6 +250,13 @@ fn moment(
     let sampler = Sampler::new(geometry, &rows);
     let deposit = Deposit::new(geometry, &rows, &sampler);
     let basal = Basal::new(geometry, &rows, &sampler, &deposit, wanted.level);
+    let health = match wanted.first {
+        None => Health::at(scene, geometry, &rows, &sampler),
+        Some(first) => {
+            let start = Start::of(&terrain::levelled(scene, snapshot::read(first)?.1));
+            Health::at_end(scene, geometry, &rows, &sampler, wanted.static_speed, &start)
+        }
+    };
     let section = Section::new(geometry, &rows, &sampler, &deposit.profile);
     let layers = wanted.layers.filter(|layers| layers.are_of(&rows));
     let plane = section::plane(geometry, &rows);
@@ -255,7 +274,7 @@ fn moment(
         deposit,
         basal,
     };
-    Ok((moment, on_ground))
+    Ok((moment, on_ground, health))
 }
 
 /// Where the particles were at the start: from the file `sph-prep` made, else from a snapshot of that time.

@@ -2,7 +2,7 @@
 //!
 //! Threads ([`workers`]) evaluate a snapshot each; of several ranks one works. [`geometry`] says what the scene means for the evaluation,
 //! [`sample`] gives fields at any point, [`deposit`], [`basal`], [`dip`], [`energy`], [`layers`], [`section`], [`flow`], [`shear`] and
-//! [`failure_plane`] evaluate one snapshot, [`analysis`] goes through the run, [`partition`] through its history, [`terrain`] maps what
+//! [`failure_plane`] evaluate one snapshot, [`health`] says how sound the run is, [`analysis`] goes through the run, [`partition`] through its history, [`terrain`] maps what
 //! happened on a terrain, [`netcdf`], [`plot`], [`page`] and [`report`] show what it found.
 
 pub mod analysis;
@@ -16,6 +16,7 @@ pub mod failure_plane;
 pub mod field;
 pub mod flow;
 pub mod geometry;
+pub mod health;
 pub mod history;
 pub mod layers;
 pub mod netcdf;

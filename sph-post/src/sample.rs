@@ -32,6 +32,21 @@ pub struct Sampler {
     dx: f64,
 }
 
+/// What lies near a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Neighbour {
+    /// Its row, also of an image.
+    pub row: usize,
+    /// Is it a mirror image?
+    pub is_image: bool,
+    /// Distance, m.
+    pub distance: f64,
+    /// Its place from the point, m.
+    pub offset: [f64; 3],
+    /// V W.
+    pub weight: f64,
+}
+
 /// Weights of the rows around a point. Their sum is one.
 pub struct Stencil {
     rows: Vec<(u32, [bool; 2], f64)>,
@@ -92,6 +107,20 @@ impl Sampler {
                 }
             }
         }
+    }
+
+    /// Everything closer than 2h to `at`, images too.
+    pub fn neighbours(&self, at: [f64; 3], mut visit: impl FnMut(Neighbour)) {
+        let norm = self.kernel.norm(self.dimension) / self.h.powi(self.dimension as i32);
+        self.around(at, |p, q| {
+            visit(Neighbour {
+                row: p.row as usize,
+                is_image: p.flipped != [false; 2],
+                distance: q * self.h,
+                offset: [0, 1, 2].map(|a| p.x[a] - at[a]),
+                weight: p.volume * norm * self.kernel.shape(q),
+            });
+        });
     }
 
     /// The share of space around `at` that is filled with material: sum of V W, about 1 inside, 1/2 on a plane

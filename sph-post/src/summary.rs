@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 /// r0, null where run-outs are or the run is shorter than T; `kinetic_over_peak` is the kinetic energy at the end over its
 /// peak. Both come from the history where there is one, since it is finer than the snapshots. `energy_closure` and
 /// `dissipated_share` are there only where the history tells the work that was done ([`crate::partition::Partition`]),
-/// and `peak_speed_m_s`, the largest speed of a particle, where it has the column `max_speed`.
+/// and `peak_speed_m_s`, the largest speed of a particle, where it has the column `max_speed`. The last ones are those of
+/// [`crate::health::Health`].
 ///
 /// # Errors
 /// Whatever can't be written.
@@ -69,6 +70,9 @@ fn json(a: &Analysis) -> serde_json::Value {
     if let Some(partition) = &a.partition {
         numbers["energy_closure"] = partition.error().into();
         numbers["dissipated_share"] = partition.dissipated(potential).into();
+    }
+    if let serde_json::Value::Object(numbers) = &mut numbers {
+        numbers.extend(a.health.numbers().map(|(name, value)| (name.to_owned(), value.into())));
     }
     numbers
 }

@@ -10,6 +10,7 @@ mod gate;
 mod launch;
 mod paths;
 mod scaling;
+mod stability;
 mod stage;
 mod status;
 mod study;
@@ -87,6 +88,11 @@ enum Command {
         #[command(flatten)]
         options: study::Options,
     },
+    /// Run each method on scenes that make SPH fail, as far as that is missing, and draw who stands where: docs/stability.
+    Stability {
+        #[command(flatten)]
+        options: study::Options,
+    },
     /// Measure what costs how much; writes tests/bench.
     Bench {
         #[command(subcommand)]
@@ -153,6 +159,7 @@ fn carry_out(command: Command) -> Result<(), Failure> {
         Command::Study { name: Some(name), options } => study::carry_out(&name, &options),
         Command::Chart { name: None, .. } => charts::list(),
         Command::Chart { name: Some(name), options } => charts::carry_out(&name, &options),
+        Command::Stability { options } => stability::carry_out(&options),
         Command::Bench { bench } => bench::carry_out(&bench),
         Command::Scaling { options } => scaling::carry_out(&options),
         Command::Faults { options } => faults::carry_out(&options),

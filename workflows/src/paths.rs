@@ -53,6 +53,16 @@ pub fn charts_page() -> PathBuf {
     repository().join("docs").join("charts").join("README.md")
 }
 
+/// `tests/stability`.
+pub fn stability() -> PathBuf {
+    repository().join("tests").join("stability")
+}
+
+/// The page of the map of methods and failures; its picture lies beside it.
+pub fn stability_page() -> PathBuf {
+    repository().join("docs").join("stability").join("README.md")
+}
+
 /// A path of the command line: relative to where the user called, which the launcher leaves for the repository's root.
 pub fn from_caller(path: &Path) -> PathBuf {
     called_from().join(path)

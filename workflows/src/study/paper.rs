@@ -80,6 +80,20 @@ impl Paper {
         self.write(text, &format!("transform=\"translate({x:.1} {y:.1}) rotate(-90)\""), Anchor::Middle);
     }
 
+    /// Text that climbs upward from a place, its middle at that distance from the left.
+    pub fn climbing(&mut self, text: &str, [x, y]: [f64; 2]) {
+        let place = format!("transform=\"translate({:.1} {y:.1}) rotate(-90)\"", x + 4.5);
+        self.write(text, &place, Anchor::Start);
+    }
+
+    /// A filled rectangle from its upper left corner.
+    pub fn rectangle(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], fill: &str) {
+        let _ = writeln!(
+            self.body,
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"{fill}\"/>"
+        );
+    }
+
     fn write(&mut self, text: &str, place: &str, anchor: Anchor) {
         let anchor = match anchor {
             Anchor::Start => "start",
