@@ -6,9 +6,17 @@
 //! Over a terrain the lattice is sheared: each column along z is moved so that the border between its cells -1 and 0 lies on
 //! the ground. Cells keep their volume, all sites with k < 0 lie below the ground, and none comes nearer to it than half a
 //! spacing along z, so that there are no steps in the floor.
+//!
+//! Obstacles are filled with sites of the lattice that is not sheared. Where a site also lies behind a wall or below the ground,
+//! the wall or the ground has it: without a terrain it is the same site, and does what the wall does; over one, where the walls' and
+//! the ground's sites are others, the obstacle has none there.
 
-use super::{PeriodicAxis, Scene, Slip, Terrain, Wall, WallKind};
-use crate::space::Space;
+use super::{
+    Inside, PeriodicAxis, Scene, Slip, Terrain, Thin, Wall, WallKind,
+    fit::TOLERANCE,
+    solids::{Sample, Solids},
+};
+use crate::{space::Space, stl::Triangle};
 use std::sync::Arc;
 
 /// Lists of neighbours reach less far, in smoothing lengths. Behind a terrain sites are found as far.
@@ -16,6 +24,10 @@ pub const FARTHEST: f64 = 2.7;
 
 /// Lattice coordinates of a site; unused axes are zero.
 pub type Site = [i32; 3];
+
+/// Over a terrain the sites of obstacles, which are not sheared, are numbered from here along z: less than half of it is what either
+/// kind may have of them (see `obstacle::MOST_LAYERS`).
+const PLAIN: i32 = 1 << 19;
 
 /// Sites behind the walls of a scene.
 #[derive(Clone, Debug)]
@@ -31,7 +43,8 @@ pub struct WallLattice {
     symmetric: [bool; 2],
     space: Space,
     terrain: Option<Arc<Floor>>,
-    /// No reach may be larger over a terrain, m.
+    solids: Option<Arc<Solids>>,
+    /// No reach may be larger over a terrain or near an obstacle, m.
     farthest: f64,
 }
 
@@ -60,7 +73,7 @@ pub struct Parity {
     pub motion: [f64; 3],
     /// Is the axis reflected in the stress?
     pub reflected: [bool; 3],
-    /// Normal of a free-slip terrain in which both are reflected before that.
+    /// Normal of a free-slip terrain or obstacle in which both are reflected before that.
     pub normal: Option<[f64; 3]>,
 }
 
@@ -83,7 +96,7 @@ impl WallLattice {
         walls.extend(others);
         let periods = [0, 1, 2].map(|axis| scene.periodic_axis(axis));
         let farthest = FARTHEST * scene.h();
-        Self {
+        let mut lattice = Self {
             walls,
             with_sites,
             axes: scene.space.axes(),
@@ -93,8 +106,12 @@ impl WallLattice {
             symmetric: scene.symmetry,
             space: scene.space,
             terrain: scene.terrain.as_ref().map(|terrain| Arc::new(Floor::new(terrain, farthest))),
+            solids: None,
             farthest,
-        }
+        };
+        let lengths = periods.map(|period| period.map(|period| period.length));
+        lattice.solids = Solids::new(&scene.obstacles, lengths, |triangle| lattice.hides(triangle));
+        lattice
     }
 
     /// Where the borders of cells are counted from, m.
@@ -172,10 +189,17 @@ impl WallLattice {
                 home[a] = x[a];
             }
         }
-        if let Some(ground) = self.ground(home) {
+        if self.is_plain(site) {
+            x[2] -= f64::from(PLAIN) * self.spacing;
+        } else if let Some(ground) = self.ground(home) {
             x[2] = ground + (f64::from(site[2]) + 0.5) * self.spacing;
         }
         x
+    }
+
+    /// Is it a site of an obstacle over a terrain?
+    fn is_plain(&self, site: Site) -> bool {
+        self.solids.is_some() && self.terrain.is_some() && site[2] >= PLAIN / 2
     }
 
     /// The site's global number: bit 63 is set, then 21 bits an axis. Ascending order is lexicographic in z, y, x.
@@ -184,20 +208,20 @@ impl WallLattice {
         1 << 63 | part(site[2]) << 42 | part(site[1]) << 21 | part(site[0])
     }
 
-    /// Signed distance of a point to the nearest wall, m: positive on the material's side, infinite without walls. Above a terrain
-    /// it may be less, but is never more.
+    /// Signed distance of a point to the nearest wall, m: positive on the material's side, infinite without walls. Above a terrain,
+    /// and further than [`FARTHEST`] from an obstacle, it may be less, but is never more.
     pub fn distance(&self, x: [f64; 3]) -> f64 {
-        nearest(&self.walls, x).min(self.above_ground(x))
+        nearest(&self.walls, x).min(self.above_ground(x)).min(self.outside_obstacles(x))
     }
 
     /// The same to the nearest wall that has sites.
     pub fn distance_of_sites(&self, x: [f64; 3]) -> f64 {
-        nearest(&self.walls[..self.with_sites], x).min(self.above_ground(x))
+        nearest(&self.walls[..self.with_sites], x).min(self.above_ground(x)).min(self.outside_obstacles(x))
     }
 
     /// Is there a wall that has sites?
     pub fn has_sites(&self) -> bool {
-        self.with_sites > 0 || self.terrain.is_some()
+        self.with_sites > 0 || self.terrain.is_some() || self.solids.is_some()
     }
 
     /// The walls with sites that a point lies behind.
@@ -234,6 +258,17 @@ impl WallLattice {
                 }
             }
         }
+        if stuck == 0.0
+            && parity.normal.is_none()
+            && !parity.reflected.contains(&true)
+            && let Some(inside) = self.inside_obstacle(x)
+        {
+            if inside.smooth {
+                parity.normal = Some(inside.normal);
+            } else {
+                stuck = 1.0;
+            }
+        }
         if stuck > 0.0 {
             parity.velocity = parity.velocity.map(|factor| -factor);
             parity.motion = parity.motion.map(|sum| sum / stuck);
@@ -257,7 +292,7 @@ impl WallLattice {
 
     /// Calls `visit` for every wall site within `reach` of `x`.
     pub fn near(&self, x: [f64; 3], reach: f64, mut visit: impl FnMut(Site)) {
-        debug_assert!(self.terrain.is_none() || reach <= self.farthest);
+        debug_assert!((self.terrain.is_none() && self.solids.is_none()) || reach <= self.farthest);
         if self.distance_of_sites(x) >= reach {
             return;
         }
@@ -267,21 +302,115 @@ impl WallLattice {
             low[a] = (s - reach / self.spacing).ceil() as i32;
             high[a] = (s + reach / self.spacing).floor() as i32;
         }
+        let near_solid = self.solids.is_some() && self.outside_obstacles(x) < reach;
+        let mut up = 0;
         if self.terrain.is_some() {
-            return self.near_terrain(x, reach, [low, high], visit);
+            self.near_terrain(x, reach, [low, high], &mut visit);
+            if !near_solid {
+                return;
+            }
+            up = PLAIN;
         }
         for k in low[2]..=high[2] {
             for j in low[1]..=high[1] {
                 for i in low[0]..=high[0] {
-                    let site = [i, j, k];
+                    let site = [i, j, k + up];
                     let p = self.position(site);
                     let r2: f64 = self.axes.iter().map(|&a| (p[a] - x[a]).powi(2)).sum();
-                    if r2 < reach * reach && self.distance_of_sites(p) < 0.0 {
+                    if r2 >= reach * reach {
+                        continue;
+                    }
+                    let behind = nearest(&self.walls[..self.with_sites], p) < 0.0;
+                    // Over a terrain what lies behind a wall has been visited.
+                    if (behind && up == 0) || (!behind && near_solid && self.is_in_obstacle(site, p)) {
                         visit(site);
                     }
                 }
             }
         }
+    }
+}
+
+/// Obstacles.
+impl WallLattice {
+    /// How many there are.
+    pub fn obstacles(&self) -> usize {
+        self.solids.as_ref().map_or(0, |solids| solids.len())
+    }
+
+    /// The obstacle that a point lies in, and where it would come out.
+    pub fn inside_obstacle(&self, x: [f64; 3]) -> Option<Inside> {
+        let solids = self.solids.as_ref()?;
+        let (home, sign) = self.home(x);
+        let inside = solids.around(home)?;
+        Some(Inside { normal: [0, 1, 2].map(|a| sign[a] * inside.normal[a]), ..inside })
+    }
+
+    /// Distance to the nearest obstacle, m: negative inside, infinite where there is none.
+    pub fn outside_obstacles(&self, x: [f64; 3]) -> f64 {
+        self.solids.as_ref().map_or(f64::INFINITY, |solids| solids.distance(self.home(x).0, self.farthest))
+    }
+
+    /// Obstacles that are thinner than `thickness` in a good part.
+    pub fn thin_obstacles(&self, thickness: f64) -> Vec<Thin> {
+        self.solids.as_ref().map_or(Vec::new(), |solids| solids.thin(thickness))
+    }
+
+    /// Points about a spacing apart on what material can touch of all obstacles, with normals and areas.
+    pub fn surface_of_obstacles(&self) -> Vec<Sample> {
+        let all = self.solids.iter().flat_map(|solids| (0..solids.len()).map(move |n| solids.surface(n, self.spacing)));
+        all.flatten().collect()
+    }
+
+    /// The same place, between the ends of periods and on the material's side of planes of symmetry and mirrors, and which
+    /// components of vectors have been turned around on the way. Obstacles are mirrored and repeated with the material.
+    fn home(&self, x: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+        let (mut at, mut sign) = (x, [1.0; 3]);
+        for a in 0..3 {
+            if let Some(period) = self.periods[a] {
+                at[a] = period.wrap(at[a]);
+            }
+            if a < 2 && self.symmetric[a] && at[a] < 0.0 {
+                (at[a], sign[a]) = (-at[a], -sign[a]);
+            }
+            for wall in self.walls[self.with_sites..].iter().filter(|wall| wall.axis == a) {
+                if wall.side * (at[a] - wall.at) < 0.0 {
+                    (at[a], sign[a]) = (2.0 * wall.at - at[a], -sign[a]);
+                }
+            }
+        }
+        (at, sign)
+    }
+
+    /// Is a site that lies behind no wall one of an obstacle?
+    fn is_in_obstacle(&self, site: Site, p: [f64; 3]) -> bool {
+        let Some(solids) = &self.solids else { return false };
+        let found = || self.above_ground(p) >= 0.0 && solids.around(self.home(p).0).is_some();
+        solids.has(site, found)
+    }
+
+    /// Can no material touch a triangle? It lies behind a wall, a plane of symmetry or the end of a period, or below the ground.
+    fn hides(&self, triangle: &Triangle) -> bool {
+        let slack = TOLERANCE * self.spacing;
+        let beyond = |axis: usize, side: f64, at: f64| triangle.iter().all(|x| side * (x[axis] - at) <= slack);
+        let by_plane = self.walls.iter().any(|wall| beyond(wall.axis, wall.side, wall.at))
+            || (0..2).any(|a| self.symmetric[a] && beyond(a, 1.0, 0.0));
+        let by_period = (0..3).any(|a| {
+            self.periods[a]
+                .is_some_and(|period| beyond(a, 1.0, period.from) || beyond(a, -1.0, period.from + period.length))
+        });
+        by_plane || by_period || (self.terrain.is_some() && self.is_buried(triangle, 6))
+    }
+
+    /// Does the ground cover a triangle? It is looked at in 4^n parts.
+    fn is_buried(&self, triangle: &Triangle, n: u32) -> bool {
+        let covered = |x: &[f64; 3]| self.ground(*x).is_some_and(|ground| x[2] <= ground + TOLERANCE * self.spacing);
+        let [a, b, c] = *triangle;
+        let middle = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
+        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+        triangle.iter().all(covered)
+            && (n == 0
+                || [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].iter().all(|part| self.is_buried(part, n - 1)))
     }
 }
 
