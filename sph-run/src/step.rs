@@ -171,7 +171,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     }
 
     /// Lays out some particles, and sums the stresses around some owned ones.
-    fn push(&mut self, new: Range<usize>, part: Range<usize>) {
+    pub(crate) fn push(&mut self, new: Range<usize>, part: Range<usize>) {
         let spacing = self.parameters.spacing;
         let mut a = std::mem::take(&mut self.particles.a);
         let mut buffers = std::mem::take(&mut self.buffers);

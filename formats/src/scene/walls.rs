@@ -75,6 +75,8 @@ pub struct Parity {
     pub reflected: [bool; 3],
     /// Normal of a free-slip terrain or obstacle in which both are reflected before that.
     pub normal: Option<[f64; 3]>,
+    /// The obstacle that it belongs to, by number.
+    pub obstacle: Option<usize>,
 }
 
 impl WallLattice {
@@ -234,7 +236,8 @@ impl WallLattice {
     /// the corrections that only shear components with one normal index change sign, and that a wall may slide along
     /// itself with a velocity V; in the corner of two no-slip walls V is the mean of theirs).
     pub fn parity(&self, x: [f64; 3]) -> Parity {
-        let mut parity = Parity { velocity: [1.0; 3], motion: [0.0; 3], reflected: [false; 3], normal: None };
+        let mut parity =
+            Parity { velocity: [1.0; 3], motion: [0.0; 3], reflected: [false; 3], normal: None, obstacle: None };
         let mut stuck = 0.0;
         if let Some(floor) = &self.terrain
             && self.above_ground(x) < 0.0
@@ -263,6 +266,7 @@ impl WallLattice {
             && !parity.reflected.contains(&true)
             && let Some(inside) = self.inside_obstacle(x)
         {
+            parity.obstacle = Some(inside.obstacle);
             if inside.smooth {
                 parity.normal = Some(inside.normal);
             } else {
@@ -463,10 +467,21 @@ mod tests {
     #[test]
     fn walls_turn_what_is_extrapolated() {
         let smooth = lattice(&format!("{FLOOR}{SIDE}\"free-slip\"\n"));
-        let moving = Parity { velocity: [-1.0; 3], motion: [1.0, 0.0, 0.0], reflected: [false; 3], normal: None };
+        let moving = Parity {
+            velocity: [-1.0; 3],
+            motion: [1.0, 0.0, 0.0],
+            reflected: [false; 3],
+            normal: None,
+            obstacle: None,
+        };
         assert_eq!(smooth.parity([0.05, 0.0, -0.01]), moving);
-        let side =
-            Parity { velocity: [-1.0, 1.0, 1.0], motion: [0.0; 3], reflected: [true, false, false], normal: None };
+        let side = Parity {
+            velocity: [-1.0, 1.0, 1.0],
+            motion: [0.0; 3],
+            reflected: [true, false, false],
+            normal: None,
+            obstacle: None,
+        };
         assert_eq!(smooth.parity([0.11, 0.0, 0.05]), side);
         let corner = Parity { velocity: [1.0, -1.0, -1.0], reflected: side.reflected, ..moving };
         assert_eq!(smooth.parity([0.11, 0.0, -0.01]), corner);

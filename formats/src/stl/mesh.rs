@@ -78,6 +78,25 @@ impl Solid {
     }
 }
 
+impl Solid {
+    /// The lines that bound it seen from above: edges between a triangle that faces upwards and one that does not.
+    pub fn outline(&self) -> Vec<[[f64; 2]; 2]> {
+        let bits = |x: [f64; 3]| x.map(|c| (c + 0.0).to_bits());
+        let mut edges: HashMap<_, (usize, [[f64; 2]; 2])> = HashMap::new();
+        for (t, normal) in self.triangles.iter().zip(&self.normals) {
+            for k in 0..3 {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                let key = (bits(a).min(bits(b)), bits(a).max(bits(b)));
+                let edge = edges.entry(key).or_insert((0, [[a[0], a[1]], [b[0], b[1]]]));
+                edge.0 += usize::from(normal[2] > 1e-9);
+            }
+        }
+        let mut lines: Vec<_> = edges.into_iter().filter(|(_, (up, _))| *up == 1).collect();
+        lines.sort_unstable_by_key(|(key, _)| *key);
+        lines.into_iter().map(|(_, (_, line))| line).collect()
+    }
+}
+
 /// Corners by number.
 struct Joined {
     corners: Vec<[f64; 3]>,
@@ -231,6 +250,10 @@ mod tests {
         assert_eq!(turned.volume, solid.volume);
         assert_eq!(turned.normals, solid.normals);
         assert_eq!(solid.normals[0], [-1.0, 0.0, 0.0]);
+        let outline = solid.outline();
+        let length = |[a, b]: &[[f64; 2]; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        assert_eq!(outline.len(), 4);
+        assert!((outline.iter().map(length).sum::<f64>() - 10.0).abs() < 1e-12);
         let placed = Solid::placed(&triangles, 0.5, [10.0, 0.0, 0.0]).unwrap();
         assert_eq!((placed.low, placed.high), ([10.5, 1.0, -0.5], [11.5, 2.5, 0.25]));
     }

@@ -59,6 +59,16 @@ impl Walls {
         (of, widest)
     }
 
+    /// How many obstacles there are.
+    pub fn obstacles(&self) -> usize {
+        self.lattice.obstacles()
+    }
+
+    /// The obstacle of every wall particle, in their order: those of walls have none.
+    pub fn of_obstacles(&self) -> impl Iterator<Item = Option<usize>> {
+        self.parities.iter().map(|parity| parity.obstacle)
+    }
+
     /// Puts owned particles back that have come below a terrain or into an obstacle in a drift of length `dt`: the virtual particles
     /// carry what is dense, but not what flies alone. They lose the velocity into it and, unless it is smooth, as much
     /// of that along it; nothing moves further than it would have gone without it.
