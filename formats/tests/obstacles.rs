@@ -121,7 +121,7 @@ fn what_cannot_be_an_obstacle_is_refused() {
         ("min = [0, 0, 0], max = [10, 10, 4]", "min = [0, 0, 2], max = [10, 10, 4]"),
     ]);
     let report = read(place.path(), &beyond).unwrap_err();
-    assert!(report.contains("lies beyond the terrain, which reaches from -5 m to 35 m along x"), "{report}");
+    assert!(report.contains("lies beyond the terrain, which reaches from -4 m to 34 m along x"), "{report}");
 }
 
 fn sites(lattice: &WallLattice, x: [f64; 3], reach: f64) -> HashSet<[i32; 3]> {

@@ -2,7 +2,7 @@
 
 use super::{
     canvas::{self, Frame, MARGIN, SMALL, viridis},
-    title,
+    outline, title,
 };
 use crate::{analysis::Analysis, failure::Failure, terrain::Maps};
 use plotters::{
@@ -76,35 +76,15 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
                 let pen = canvas::pen(RGBColor(110, 100, 90), 0.6);
                 canvas::polyline(area, &[on(ends[0]), on(ends[1])], pen, false)?;
             }
-            for ends in a.scene.obstacles.iter().flat_map(|obstacle| obstacle.solid.outline()) {
-                let Some(ends) = within(ends, [x, y]) else { continue };
+            for ends in outline::of_obstacles(a, 1.0, [x, y]) {
                 let on = |p: [f64; 2]| (inner[0] + (p[0] - x[0]) * scale, inner[3] - (p[1] - y[0]) * scale);
-                canvas::polyline(area, &[on(ends[0]), on(ends[1])], canvas::pen(RGBColor(170, 0, 40), 1.0), false)?;
+                canvas::polyline(area, &ends.map(on), canvas::pen(outline::COLOUR, 1.0), false)?;
             }
             let bar = [top + 10.0, (top + 10.0 + size[1].min(240.0)).max(top + 110.0)];
             canvas::colour_bar(area, left + size[0] + 16.0, bar, [0.0, most.max(1e-9)], &format!("({unit})"))?;
         }
         Ok(())
     })
-}
-
-/// The part of a line within the ranges of x and y.
-fn within([a, b]: [[f64; 2]; 2], ranges: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
-    let (mut first, mut last) = (0.0_f64, 1.0_f64);
-    for k in 0..2 {
-        let step = b[k] - a[k];
-        let [low, high] = ranges[k];
-        if step == 0.0 {
-            if a[k] < low || a[k] > high {
-                return None;
-            }
-            continue;
-        }
-        let (s, t) = ((low - a[k]) / step, (high - a[k]) / step);
-        (first, last) = (first.max(s.min(t)), last.min(s.max(t)));
-    }
-    let at = |s: f64| [0, 1].map(|k| a[k] + s * (b[k] - a[k]));
-    (first < last).then(|| [at(first), at(last)])
 }
 
 /// Height between lines: round.
