@@ -209,7 +209,7 @@ fn changes(folder: &RunFolder, job: &Job) -> Result<Vec<Change>, Failure> {
     let (then, now) = (std::fs::read_to_string(folder.scene()), std::fs::read_to_string(job.scene));
     let reason = match (then, now) {
         (Ok(_), Ok(_)) if !folder.initial().is_file() => "holds a preparation that did not finish".to_owned(),
-        // Where a raster is named, it may have changed under its name.
+        // Where a file is named, it may have changed under its name.
         (Ok(then), Ok(now)) if then == now && !["terrain", "obstacle"].iter().any(|table| now.contains(table)) => {
             return Ok(Vec::new());
         }

@@ -11,12 +11,8 @@
 //! the wall or the ground has it: without a terrain it is the same site, and does what the wall does; over one, where the walls' and
 //! the ground's sites are others, the obstacle has none there.
 
-use super::{
-    Inside, PeriodicAxis, Scene, Slip, Terrain, Thin, Wall, WallKind,
-    fit::TOLERANCE,
-    solids::{Sample, Solids},
-};
-use crate::{space::Space, stl::Triangle};
+use super::{PeriodicAxis, Scene, Slip, Terrain, Wall, WallKind, solids::Solids};
+use crate::space::Space;
 use std::sync::Arc;
 
 /// Lists of neighbours reach less far, in smoothing lengths. Behind a terrain sites are found as far.
@@ -33,24 +29,24 @@ const PLAIN: i32 = 1 << 19;
 #[derive(Clone, Debug)]
 pub struct WallLattice {
     /// Those of kind `virtual` first.
-    walls: Vec<Wall>,
+    pub(super) walls: Vec<Wall>,
     /// How many of them are of that kind: only these have sites.
-    with_sites: usize,
+    pub(super) with_sites: usize,
     axes: &'static [usize],
     origin: [f64; 3],
-    spacing: f64,
-    periods: [Option<PeriodicAxis>; 3],
-    symmetric: [bool; 2],
+    pub(super) spacing: f64,
+    pub(super) periods: [Option<PeriodicAxis>; 3],
+    pub(super) symmetric: [bool; 2],
     space: Space,
-    terrain: Option<Arc<Floor>>,
-    solids: Option<Arc<Solids>>,
+    pub(super) terrain: Option<Arc<Floor>>,
+    pub(super) solids: Option<Arc<Solids>>,
     /// No reach may be larger over a terrain or near an obstacle, m.
-    farthest: f64,
+    pub(super) farthest: f64,
 }
 
 /// A terrain, as sites need it.
 #[derive(Debug)]
-struct Floor {
+pub(super) struct Floor {
     terrain: Terrain,
     /// 1/sqrt(1 + s^2) with the steepest slope s within reach of each cell of the raster: no point of the ground is nearer than
     /// the height above it times that.
@@ -166,7 +162,7 @@ impl WallLattice {
     }
 
     /// Lower bound of the distance to the ground, m; negative below it, infinite without a terrain.
-    fn above_ground(&self, x: [f64; 3]) -> f64 {
+    pub(super) fn above_ground(&self, x: [f64; 3]) -> f64 {
         let Some(floor) = &self.terrain else { return f64::INFINITY };
         let at = self.fold(x);
         let height = x[2] - floor.terrain.height(at[0], at[1]);
@@ -332,89 +328,6 @@ impl WallLattice {
                 }
             }
         }
-    }
-}
-
-/// Obstacles.
-impl WallLattice {
-    /// How many there are.
-    pub fn obstacles(&self) -> usize {
-        self.solids.as_ref().map_or(0, |solids| solids.len())
-    }
-
-    /// The obstacle that a point lies in, and where it would come out.
-    pub fn inside_obstacle(&self, x: [f64; 3]) -> Option<Inside> {
-        let solids = self.solids.as_ref()?;
-        let (home, sign) = self.home(x);
-        let inside = solids.around(home)?;
-        Some(Inside { normal: [0, 1, 2].map(|a| sign[a] * inside.normal[a]), ..inside })
-    }
-
-    /// Distance to the nearest obstacle, m: negative inside, infinite where there is none.
-    pub fn outside_obstacles(&self, x: [f64; 3]) -> f64 {
-        self.solids.as_ref().map_or(f64::INFINITY, |solids| solids.distance(self.home(x).0, self.farthest))
-    }
-
-    /// Obstacles that are thinner than `thickness` in a good part.
-    pub fn thin_obstacles(&self, thickness: f64) -> Vec<Thin> {
-        self.solids.as_ref().map_or(Vec::new(), |solids| solids.thin(thickness))
-    }
-
-    /// Points about a spacing apart on what material can touch of all obstacles, with normals and areas.
-    pub fn surface_of_obstacles(&self) -> Vec<Sample> {
-        let all = self.solids.iter().flat_map(|solids| (0..solids.len()).map(move |n| solids.surface(n, self.spacing)));
-        all.flatten().collect()
-    }
-
-    /// The same place, between the ends of periods and on the material's side of planes of symmetry and mirrors, and which
-    /// components of vectors have been turned around on the way. Obstacles are mirrored and repeated with the material.
-    fn home(&self, x: [f64; 3]) -> ([f64; 3], [f64; 3]) {
-        let (mut at, mut sign) = (x, [1.0; 3]);
-        for a in 0..3 {
-            if let Some(period) = self.periods[a] {
-                at[a] = period.wrap(at[a]);
-            }
-            if a < 2 && self.symmetric[a] && at[a] < 0.0 {
-                (at[a], sign[a]) = (-at[a], -sign[a]);
-            }
-            for wall in self.walls[self.with_sites..].iter().filter(|wall| wall.axis == a) {
-                if wall.side * (at[a] - wall.at) < 0.0 {
-                    (at[a], sign[a]) = (2.0 * wall.at - at[a], -sign[a]);
-                }
-            }
-        }
-        (at, sign)
-    }
-
-    /// Is a site that lies behind no wall one of an obstacle?
-    fn is_in_obstacle(&self, site: Site, p: [f64; 3]) -> bool {
-        let Some(solids) = &self.solids else { return false };
-        let found = || self.above_ground(p) >= 0.0 && solids.around(self.home(p).0).is_some();
-        solids.has(site, found)
-    }
-
-    /// Can no material touch a triangle? It lies behind a wall, a plane of symmetry or the end of a period, or below the ground.
-    fn hides(&self, triangle: &Triangle) -> bool {
-        let slack = TOLERANCE * self.spacing;
-        let beyond = |axis: usize, side: f64, at: f64| triangle.iter().all(|x| side * (x[axis] - at) <= slack);
-        let by_plane = self.walls.iter().any(|wall| beyond(wall.axis, wall.side, wall.at))
-            || (0..2).any(|a| self.symmetric[a] && beyond(a, 1.0, 0.0));
-        let by_period = (0..3).any(|a| {
-            self.periods[a]
-                .is_some_and(|period| beyond(a, 1.0, period.from) || beyond(a, -1.0, period.from + period.length))
-        });
-        by_plane || by_period || (self.terrain.is_some() && self.is_buried(triangle, 6))
-    }
-
-    /// Does the ground cover a triangle? It is looked at in 4^n parts.
-    fn is_buried(&self, triangle: &Triangle, n: u32) -> bool {
-        let covered = |x: &[f64; 3]| self.ground(*x).is_some_and(|ground| x[2] <= ground + TOLERANCE * self.spacing);
-        let [a, b, c] = *triangle;
-        let middle = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
-        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-        triangle.iter().all(covered)
-            && (n == 0
-                || [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].iter().all(|part| self.is_buried(part, n - 1)))
     }
 }
 

@@ -1,7 +1,7 @@
 //! A closed surface of triangles.
 
 use super::{Triangle, nearest::Tree};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Corners nearer to each other than this fraction of the size of the whole are one.
 const SAME: f64 = 1e-6;
@@ -42,7 +42,7 @@ impl Solid {
         }
         let mut triangles = joined.triangles();
         let mut corners = joined.faces;
-        let volume: f64 = triangles.iter().map(|t| dot(t[0], cross(t[1], t[2])) / 6.0).sum();
+        let volume = volume(&triangles);
         if volume.abs() <= SAME * size.powi(3) * SAME {
             return Err("encloses no volume".into());
         }
@@ -95,6 +95,48 @@ impl Solid {
         lines.sort_unstable_by_key(|(key, _)| *key);
         lines.into_iter().map(|(_, (_, line))| line).collect()
     }
+}
+
+impl Solid {
+    /// The parts that share no corner, each a solid of its own: they may overlap. With hollows, which are parts that are turned
+    /// inwards, all of it.
+    pub fn parts(&self) -> Vec<Self> {
+        // Of each corner the number of its part, or of a part that has been joined to another one.
+        let mut parts: HashMap<[u64; 3], usize> = HashMap::new();
+        let mut joined: Vec<usize> = Vec::new();
+        let top = |joined: &[usize], mut part: usize| {
+            while joined[part] != part {
+                part = joined[part];
+            }
+            part
+        };
+        let key = |x: [f64; 3]| x.map(|c| (c + 0.0).to_bits());
+        for t in &self.triangles {
+            let known: Vec<usize> = t.iter().filter_map(|x| parts.get(&key(*x))).map(|p| top(&joined, *p)).collect();
+            let part = known.iter().copied().min().unwrap_or(joined.len());
+            if part == joined.len() {
+                joined.push(part);
+            }
+            known.into_iter().for_each(|other| joined[other] = part);
+            t.iter().for_each(|x| {
+                parts.insert(key(*x), part);
+            });
+        }
+        let mut found: BTreeMap<usize, Vec<Triangle>> = BTreeMap::new();
+        for t in &self.triangles {
+            found.entry(top(&joined, parts[&key(t[0])])).or_default().push(*t);
+        }
+        let outwards = |triangles: &Vec<Triangle>| volume(triangles) > 0.0;
+        let solids: Option<Vec<Self>> = match found.len() > 1 && found.values().all(outwards) {
+            true => found.into_values().map(|triangles| Self::new(triangles).ok()).collect(),
+            false => None,
+        };
+        solids.unwrap_or_else(|| vec![self.clone()])
+    }
+}
+
+fn volume(triangles: &[Triangle]) -> f64 {
+    triangles.iter().map(|t| dot(t[0], cross(t[1], t[2])) / 6.0).sum()
 }
 
 /// Corners by number.
@@ -256,6 +298,21 @@ mod tests {
         assert!((outline.iter().map(length).sum::<f64>() - 10.0).abs() < 1e-12);
         let placed = Solid::placed(&triangles, 0.5, [10.0, 0.0, 0.0]).unwrap();
         assert_eq!((placed.low, placed.high), ([10.5, 1.0, -0.5], [11.5, 2.5, 0.25]));
+    }
+
+    #[test]
+    fn parts_are_solids_unless_one_is_a_hollow() {
+        let two = [block([0.0; 3], [2.0; 3]), block([1.0; 3], [3.0; 3])].concat();
+        let parts = Solid::new(two).unwrap().parts();
+        assert_eq!(parts.len(), 2);
+        // Inside the first, and nearest to the surface of the second: there the whole seems to have a hole.
+        let x = [0.95, 1.5, 1.5];
+        assert!(parts[0].contains(x) && !parts[1].contains(x));
+        let inwards = block([0.5; 3], [1.5; 3]).into_iter().map(|[a, b, c]| [a, c, b]).collect();
+        let hollow = Solid::new([block([0.0; 3], [2.0; 3]), inwards].concat()).unwrap();
+        assert_eq!(hollow.parts().len(), 1);
+        assert!(!hollow.contains([1.0; 3]) && hollow.contains([0.25, 1.0, 1.0]));
+        assert!((hollow.volume - 7.0).abs() < 1e-12);
     }
 
     #[test]
