@@ -45,8 +45,8 @@ fn k3_a_box_is_as_good_as_a_plane_wall() {
     }
 }
 
-/// A column in a box of smooth solids: all of them together bear its weight, to rounding and what still moves, for the forces are the very
-/// ones between particles. The one under it bears nearly all of it, and the one beside it the thrust of K0 = nu/(1 - nu).
+/// A column in a box of smooth solids: all of them together bear its weight, to rounding and what still moves, for the forces
+/// are the very ones between particles. The one under it bears nearly all of it, and the one beside it the thrust of K0 = nu/(1 - nu).
 #[test]
 fn k4_a_resting_column_weighs_on_its_obstacles() {
     let work = WorkFolder::new();

@@ -7,9 +7,9 @@
 //! the ground. Cells keep their volume, all sites with k < 0 lie below the ground, and none comes nearer to it than half a
 //! spacing along z, so that there are no steps in the floor.
 //!
-//! Obstacles are filled with sites of the lattice that is not sheared. Where a site also lies behind a wall or below the ground,
-//! the wall or the ground has it: without a terrain it is the same site, and does what the wall does; over one, where the walls' and
-//! the ground's sites are others, the obstacle has none there.
+//! Obstacles are filled with sites of the lattice that is not sheared. Where a site also lies behind a wall or below the
+//! ground, the wall or the ground has it: without a terrain it is the same site, and does what the wall does; over one, where
+//! the walls' and the ground's sites are others, the obstacle has none there.
 
 use super::{PeriodicAxis, Scene, Slip, Terrain, Wall, WallKind, solids::Solids};
 use crate::space::Space;
@@ -21,8 +21,8 @@ pub const FARTHEST: f64 = 2.7;
 /// Lattice coordinates of a site; unused axes are zero.
 pub type Site = [i32; 3];
 
-/// Over a terrain the sites of obstacles, which are not sheared, are numbered from here along z: less than half of it is what either
-/// kind may have of them (see `obstacle::MOST_LAYERS`).
+/// Over a terrain the sites of obstacles, which are not sheared, are numbered from here along z: less than half of it is what
+/// either kind may have of them (see `obstacle::MOST_LAYERS`).
 const PLAIN: i32 = 1 << 19;
 
 /// Sites behind the walls of a scene.

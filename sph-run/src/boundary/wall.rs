@@ -69,8 +69,8 @@ impl Walls {
         self.parities.iter().map(|parity| parity.obstacle)
     }
 
-    /// Puts owned particles back that have come below a terrain or into an obstacle in a drift of length `dt`: the virtual particles
-    /// carry what is dense, but not what flies alone. They lose the velocity into it and, unless it is smooth, as much
+    /// Puts owned particles back that have come below a terrain or into an obstacle in a drift of length `dt`: the virtual
+    /// particles carry what is dense, but not what flies alone. They lose the velocity into it and, unless it is smooth, as much
     /// of that along it; nothing moves further than it would have gone without it.
     pub fn keep_out<const D: usize, const N: usize, S: Space<D, N>>(
         &self,
