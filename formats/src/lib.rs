@@ -26,4 +26,5 @@ pub mod scene;
 pub mod schema;
 pub mod snapshot;
 pub mod space;
+pub mod stl;
 pub mod units;

@@ -174,6 +174,7 @@ fn the_least_scene_gets_all_defaults() {
             velocity: [0.0; 3],
         }],
         terrain: None,
+        obstacles: Vec::new(),
         files: Vec::new(),
         chosen: None,
         walls: vec![Wall {
@@ -222,6 +223,7 @@ fn every_key_is_read() {
             body("ramp", Shape::Wedge { corner: [0.5, 0.0, 0.0], size: [0.2, 0.1, 0.05], falls_left: true }, [0.0; 3]),
         ],
         terrain: None,
+        obstacles: Vec::new(),
         files: Vec::new(),
         chosen: None,
         walls: vec![

@@ -1,9 +1,13 @@
 //! Warnings: what a scene may hold, but is known to lead to poor results.
 
-use crate::{initial::Stress, lattice::Lattice, summary::Body};
+use crate::{
+    initial::Stress,
+    lattice::Lattice,
+    summary::{Body, short},
+};
 use formats::{
     kernel::Kernel,
-    scene::{InitialStress, Material, Scene, Slip},
+    scene::{InitialStress, Material, Scene, Slip, Thin, WallLattice},
     space::Space,
 };
 
@@ -26,13 +30,15 @@ pub fn warnings(scene: &Scene, lattices: &[Lattice], bodies: &[Body]) -> String 
     all.extend(wide_kernel(scene));
     all.extend(beyond_yield(scene, lattices));
     all.extend(undamped_rings(scene));
+    all.extend(thin_obstacles(scene));
     all.iter().map(|text| format!("warning: {text}\n")).collect()
 }
 
 fn coarse(body: &Body) -> Option<String> {
     let (name, deviation) = (&body.name, body.deviation());
     let advice = "choose a spacing that divides its sizes, or a finer one";
-    (deviation.abs() > TOLERATED_DEVIATION)
+    // What lies in obstacles is told beside the volume.
+    (deviation.abs() > TOLERATED_DEVIATION && body.left_out == 0)
         .then(|| format!("body {name}: the volume of its particles is off by {deviation:+.1} %; {advice}"))
 }
 
@@ -51,7 +57,8 @@ fn thin(scene: &Scene, lattices: &[Lattice]) -> Vec<String> {
 fn wide_kernel(scene: &Scene) -> Option<String> {
     let (ratio, limit, name) = (scene.h_over_dx, steady_h_over_dx(scene.kernel), scene.kernel.name());
     let sticks = scene.walls.iter().any(|wall| wall.slip == Slip::NoSlip)
-        || scene.terrain.as_ref().is_some_and(|terrain| terrain.slip == Slip::NoSlip);
+        || scene.terrain.as_ref().is_some_and(|terrain| terrain.slip == Slip::NoSlip)
+        || scene.obstacles.iter().any(|obstacle| obstacle.slip == Slip::NoSlip);
     (sticks && ratio > limit).then(|| {
         format!(
             "kernel.h-over-dx = {ratio}: above {limit} the kernel {name} is unstable at no-slip walls (kinetic energy \
@@ -92,6 +99,25 @@ fn undamped_rings(scene: &Scene) -> Option<String> {
     })
 }
 
+/// Wall particles take the mean state of the material within 2h of them, on whichever side it lies.
+fn thin_obstacles(scene: &Scene) -> Vec<String> {
+    if scene.obstacles.is_empty() {
+        return Vec::new();
+    }
+    let thickness = 2.0 * scene.h();
+    let words = |thin: Thin| {
+        format!(
+            "obstacle {}: {:.0} % of its surface has another side less than 2 h = {} m behind it, as near as {} m: material on \
+             one side feels that on the other there; choose a finer spacing, or make it thicker",
+            thin.name,
+            100.0 * thin.share,
+            short(thickness),
+            short(thin.least)
+        )
+    };
+    WallLattice::new(scene).thin_obstacles(thickness).into_iter().map(words).collect()
+}
+
 /// f = alpha I1 + sqrt(J2) - k, Pa, of a stress in the order XX YY ZZ XY YZ XZ: positive outside of the cone.
 fn yield_function(alpha: f64, k: f64, s: [f64; 6]) -> f64 {
     let trace = s[0] + s[1] + s[2];
@@ -116,7 +142,7 @@ mod tests {
 
     #[test]
     fn a_coarse_body_is_warned_of() {
-        let body = |discrete| Body { name: "heap".into(), particles: 1, ideal: 1.0, discrete };
+        let body = |discrete| Body { name: "heap".into(), particles: 1, ideal: 1.0, discrete, left_out: 0 };
         let scene = block(Space::PlaneStrain);
         assert_eq!(warnings(&scene, &[], &[body(1.019), body(0.981)]), "");
         let warned = warnings(&scene, &[], &[body(0.97)]);

@@ -7,7 +7,7 @@ use crate::{
     summary::{self, short, size},
 };
 use formats::{
-    scene::{Body, InitialStress, Material, Scene, Shape, Slip, Unyielded, Wall, WallKind},
+    scene::{Body, InitialStress, Material, Obstacle, Scene, Shape, Slip, Unyielded, Wall, WallKind},
     space::Space,
 };
 use std::path::PathBuf;
@@ -64,6 +64,7 @@ fn what(scene: &Scene) -> Vec<String> {
     let mut all: Vec<String> = scene.bodies.iter().map(|body| self::body(scene, body)).collect();
     all.push(material(&scene.material));
     all.extend(scene.walls.iter().map(wall));
+    all.extend(scene.obstacles.iter().map(obstacle));
     for (axis, ends) in scene.periodic.iter().enumerate() {
         if let Some([low, high]) = ends {
             let name = ["x", "y", "z"][axis];
@@ -147,16 +148,27 @@ fn wall(wall: &Wall) -> String {
         (2, false) => "A ceiling",
         _ => "A wall",
     };
-    let slip = match wall.slip {
-        Slip::NoSlip => "to which the material sticks",
-        Slip::FreeSlip => "along which it slides without friction",
-    };
+    let slip = slip(wall.slip);
     let moves = match speed(wall.velocity) {
         0.0 => String::new(),
         v => format!("; it slides along itself at {} m/s", short(v)),
     };
     let kind = if wall.kind == WallKind::Mirror { ", made of mirror images" } else { "" };
     format!("{name} at {} = {} m, {slip}{kind}{moves}.", ["x", "y", "z"][wall.axis], short(wall.at))
+}
+
+fn slip(slip: Slip) -> &'static str {
+    match slip {
+        Slip::NoSlip => "to which the material sticks",
+        Slip::FreeSlip => "along which it slides without friction",
+    }
+}
+
+fn obstacle(obstacle: &Obstacle) -> String {
+    let (low, high) = (obstacle.solid.low, obstacle.solid.high);
+    let [x, y, z] = [0, 1, 2].map(|a| short(high[a] - low[a]));
+    let place = format!("from ({}, {}, {})", short(low[0]), short(low[1]), short(low[2]));
+    format!("`{}` is a fixed obstacle of {x} m x {y} m x {z} m {place} on, {}.", obstacle.name, slip(obstacle.slip))
 }
 
 fn how(scene: &Scene, lattices: &[Lattice]) -> Vec<String> {

@@ -4,12 +4,16 @@
 //! rank's share of the columns and summing over the shares before, so that they don't depend on the number of ranks.
 //! Then each rank makes the particles whose numbers fall to it; it never holds others.
 
-use crate::{initial::Stress, lattice::Lattice, relax};
+use crate::{
+    initial::Stress,
+    lattice::{Column, Lattice},
+    relax,
+};
 use formats::{
-    scene::Scene,
+    scene::{Scene, WallLattice},
     snapshot::{Rows, share},
 };
-use mpi::traits::*;
+use mpi::{collective::SystemOperation, traits::*};
 use std::ops::Range;
 
 /// How many particles each share of each body's columns holds.
@@ -21,6 +25,32 @@ pub struct Plan {
     shares: u64,
     /// Number of the first particle of each share, body by body, and the total at the end.
     first: Vec<u64>,
+    /// Particles of each body that would lie in obstacles, and are left out.
+    left_out: Vec<u64>,
+    clearing: Clearing,
+}
+
+/// Room that obstacles leave: particles whose places in the lattice lie inside are left out.
+#[derive(Clone, Debug)]
+struct Clearing(Option<WallLattice>);
+
+impl Clearing {
+    fn new(scene: &Scene) -> Self {
+        Self((!scene.obstacles.is_empty()).then(|| WallLattice::new(scene)))
+    }
+
+    fn is_free(&self, x: [f64; 3]) -> bool {
+        self.0.as_ref().is_none_or(|lattice| lattice.inside_obstacle(x).is_none())
+    }
+
+    /// The cells of a column that have particles.
+    fn cells(&self, lattice: &Lattice, column: Column) -> impl Iterator<Item = u64> {
+        (0..column.cells).filter(move |&cell| self.is_free([column.x, column.y, lattice.z(column, cell)]))
+    }
+
+    fn count(&self, lattice: &Lattice, column: Column) -> u64 {
+        if self.0.is_none() { column.cells } else { self.cells(lattice, column).count() as u64 }
+    }
 }
 
 impl Plan {
@@ -28,20 +58,34 @@ impl Plan {
     pub fn new(scene: &Scene, comm: &impl Communicator) -> Self {
         let lattices = lattices(scene);
         let (rank, size) = (comm.rank() as u64, comm.size() as u64);
-        let mine: Vec<u64> = lattices.iter().map(|l| count(l, share(l.columns(), rank, size))).collect();
+        let clearing = Clearing::new(scene);
+        let kept = |l: &Lattice| count(l, share(l.columns(), rank, size), &clearing);
+        let mine: Vec<u64> = lattices.iter().map(kept).collect();
         let mut all = vec![0; mine.len() * size as usize];
         comm.all_gather_into(&mine[..], &mut all[..]);
-        Self::from_counts(lattices, size, |body, rank| all[rank * mine.len() + body])
+        let mut plan = Self::from_counts(lattices, size, clearing, |body, rank| all[rank * mine.len() + body]);
+        if plan.clearing.0.is_some() {
+            let full = |l: &Lattice| count(l, share(l.columns(), rank, size), &Clearing(None));
+            let lost: Vec<u64> = plan.lattices.iter().zip(&mine).map(|(l, kept)| full(l) - kept).collect();
+            comm.all_reduce_into(&lost[..], &mut plan.left_out[..], SystemOperation::sum());
+        }
+        plan
     }
 
-    fn from_counts(lattices: Vec<Lattice>, shares: u64, counted: impl Fn(usize, usize) -> u64) -> Self {
+    fn from_counts(
+        lattices: Vec<Lattice>,
+        shares: u64,
+        clearing: Clearing,
+        counted: impl Fn(usize, usize) -> u64,
+    ) -> Self {
         let mut first = vec![0];
         for body in 0..lattices.len() {
             for rank in 0..shares as usize {
                 first.push(first[first.len() - 1] + counted(body, rank));
             }
         }
-        Self { lattices, shares, first }
+        let left_out = vec![0; lattices.len()];
+        Self { lattices, shares, first, left_out, clearing }
     }
 
     /// Number of particles.
@@ -53,6 +97,11 @@ impl Plan {
     pub fn body(&self, body: usize) -> Range<u64> {
         let shares = self.shares as usize;
         self.first[body * shares]..self.first[(body + 1) * shares]
+    }
+
+    /// Particles of a body that would lie in obstacles, and are left out.
+    pub fn left_out(&self, body: usize) -> u64 {
+        self.left_out[body]
     }
 
     /// Makes the particles with these numbers.
@@ -77,15 +126,24 @@ impl Plan {
                     continue;
                 }
                 for column in share(lattice.columns(), part, self.shares).map(|c| lattice.column(c)) {
-                    let numbers = next..next + column.cells;
-                    next = numbers.end;
-                    let wanted = numbers.start.max(ids.start)..numbers.end.min(ids.end);
-                    for id in wanted {
-                        let placed = [column.x, column.y, lattice.z(column, id - numbers.start)];
+                    if next + column.cells <= ids.start && self.clearing.0.is_none() {
+                        next += column.cells;
+                        continue;
+                    }
+                    for cell in self.clearing.cells(lattice, column) {
+                        let id = next;
+                        next += 1;
+                        if !ids.contains(&id) {
+                            continue;
+                        }
+                        let placed = [column.x, column.y, lattice.z(column, cell)];
                         let mut position = jitter.displace(id, placed);
                         if let Some(ground) = lattice.solid.ground() {
                             // The lattice leans with the ground, and so do its displacements.
                             position[2] += ground.at(position[0], position[1]) - ground.at(column.x, column.y);
+                        }
+                        if !self.clearing.is_free(position) {
+                            position = placed;
                         }
                         // What jitter does to rings leaves them their mass; relaxed, they have the same section again.
                         let mut place = [column.x, column.y];
@@ -121,7 +179,7 @@ impl Plan {
     pub fn volume(&self, body: usize, rank: u64) -> f64 {
         let lattice = &self.lattices[body];
         let columns = share(lattice.columns(), rank, self.shares).map(|c| lattice.column(c));
-        columns.map(|c| c.cells as f64 * lattice.bulk_volume(&c)).sum()
+        columns.map(|c| self.clearing.count(lattice, c) as f64 * lattice.bulk_volume(&c)).sum()
     }
 }
 
@@ -137,8 +195,8 @@ pub fn lattices(scene: &Scene) -> Vec<Lattice> {
     (0..scene.bodies.len()).map(|body| Lattice::new(scene, body)).collect()
 }
 
-fn count(lattice: &Lattice, columns: Range<u64>) -> u64 {
-    columns.map(|c| lattice.column(c).cells).sum()
+fn count(lattice: &Lattice, columns: Range<u64>, clearing: &Clearing) -> u64 {
+    columns.map(|c| clearing.count(lattice, lattice.column(c))).sum()
 }
 
 fn empty(first: u64, capacity: usize) -> Rows {
@@ -203,8 +261,9 @@ fn splitmix64(x: u64) -> u64 {
 #[cfg(test)]
 pub(crate) fn serial(scene: &Scene) -> Rows {
     let lattices = lattices(scene);
-    let counts: Vec<u64> = lattices.iter().map(|l| count(l, 0..l.columns())).collect();
-    let plan = Plan::from_counts(lattices, 1, |body, _| counts[body]);
+    let clearing = Clearing::new(scene);
+    let counts: Vec<u64> = lattices.iter().map(|l| count(l, 0..l.columns(), &clearing)).collect();
+    let plan = Plan::from_counts(lattices, 1, clearing, |body, _| counts[body]);
     plan.particles(scene, 0..plan.total())
 }
 
@@ -221,8 +280,9 @@ mod tests {
     fn made_by(scene: &Scene, size: u64) -> (Plan, Vec<Rows>) {
         let lattices = lattices(scene);
         let columns = lattices.clone();
-        let plan = Plan::from_counts(lattices, size, |body, rank| {
-            count(&columns[body], share(columns[body].columns(), rank as u64, size))
+        let clearing = Clearing::new(scene);
+        let plan = Plan::from_counts(lattices, size, clearing.clone(), |body, rank| {
+            count(&columns[body], share(columns[body].columns(), rank as u64, size), &clearing)
         });
         let rows = (0..size).map(|r| plan.particles(scene, share(plan.total(), r, size))).collect();
         (plan, rows)

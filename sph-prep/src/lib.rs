@@ -168,7 +168,7 @@ fn prepare(arguments: &Arguments, comm: &SimpleCommunicator, text: &mut String) 
     let plan = Plan::new(&scene, comm);
     let bodies = bodies(&scene, &plan, comm);
     if let Some(empty) = bodies.iter().find(|b| b.particles == 0) {
-        return Err(no_particles(arguments, text, &empty.name).into());
+        return Err(no_particles(arguments, text, empty).into());
     }
     says(summary::head(&scene, &bodies));
     says(summary::cost(&scene, Load { particles: plan.total(), ..estimate }, ranks));
@@ -187,15 +187,22 @@ fn bodies(scene: &Scene, plan: &Plan, comm: &SimpleCommunicator) -> Vec<summary:
     let mut volumes = vec![0.0; count];
     comm.all_reduce_into(&mine[..], &mut volumes[..], SystemOperation::sum());
     let particles: Vec<u64> = (0..count).map(|body| plan.body(body)).map(|ids| ids.end - ids.start).collect();
-    summary::bodies(scene, &plan.lattices, &particles, &volumes)
+    let mut bodies = summary::bodies(scene, &plan.lattices, &particles, &volumes);
+    bodies.iter_mut().enumerate().for_each(|(n, body)| body.left_out = plan.left_out(n));
+    bodies
 }
 
 /// A body that falls through the lattice.
-fn no_particles(arguments: &Arguments, text: &str, body: &str) -> SceneError {
+fn no_particles(arguments: &Arguments, text: &str, body: &summary::Body) -> SceneError {
+    let (body, left_out) = (&body.name, body.left_out);
     let title = format!("[body.{body}]");
     let line = text.lines().position(|line| line.trim_start().starts_with(&title)).map_or(1, |at| at + 1);
-    let message = "holds no particle; it must be larger than the spacing, on the positive side of planes of symmetry";
-    let fault = Fault { line, column: 1, key: format!("body.{body}"), message: message.into() };
+    let mut message =
+        "holds no particle; it must be larger than the spacing, on the positive side of planes of symmetry".to_string();
+    if left_out > 0 {
+        message = format!("lies in obstacles with all of its {left_out} particles; move it, or the obstacles");
+    }
+    let fault = Fault { line, column: 1, key: format!("body.{body}"), message };
     SceneError { file: arguments.scene.display().to_string(), faults: vec![fault] }
 }
 

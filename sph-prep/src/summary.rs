@@ -20,6 +20,8 @@ pub struct Body {
     pub ideal: f64,
     /// Volume of the particles, in the same unit.
     pub discrete: f64,
+    /// Particles that would lie in obstacles, and are left out.
+    pub left_out: u64,
 }
 
 impl Body {
@@ -36,6 +38,7 @@ pub fn bodies(scene: &Scene, lattices: &[Lattice], particles: &[u64], discrete: 
         particles: particles[n],
         ideal: lattices[n].solid.ideal_volume(),
         discrete: discrete[n],
+        left_out: 0,
     };
     (0..lattices.len()).map(one).collect()
 }
@@ -72,6 +75,16 @@ pub fn head(scene: &Scene, bodies: &[Body]) -> String {
         let (ideal, discrete) = (short(body.ideal), short(body.discrete));
         let volumes = format!("volume {ideal} {unit}, as particles {discrete} {unit} ({:+.2} %)", body.deviation());
         line("body", format!("{}: {} particles, {volumes}", body.name, body.particles));
+        if body.left_out > 0 {
+            let many = body.left_out;
+            line("", format!("{many} of its particles would lie in obstacles, and are left out of the volume too"));
+        }
+    }
+    for obstacle in &scene.obstacles {
+        let (solid, [x, y, z]) = (&obstacle.solid, [0, 1, 2].map(|a| obstacle.solid.high[a] - obstacle.solid.low[a]));
+        let size = format!("{} m x {} m x {} m", short(x), short(y), short(z));
+        let surface = format!("volume {} m3, {} triangles", short(solid.volume), solid.triangles.len());
+        line("obstacle", format!("{}: {size}, {surface} ({})", obstacle.name, obstacle.file));
     }
     out
 }

@@ -27,6 +27,7 @@ pub fn scene(space: Space, spacing: f64, shape: Shape) -> Scene {
         bodies: vec![Body { name: "body".into(), shape, velocity: [0.0; 3] }],
         walls: Vec::new(),
         terrain: None,
+        obstacles: Vec::new(),
         files: Vec::new(),
         initial: Initial { stress: InitialStress::Zero, lattice: Lattice::Cubic, jitter: 0.0, seed: 1, relax: 0 },
         numerics: Numerics {

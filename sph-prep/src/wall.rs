@@ -46,6 +46,16 @@ pub fn within_reach(scene: &Scene, lattices: &[Lattice]) -> u64 {
             }
         }
     }
+    if !scene.obstacles.is_empty() {
+        let layers = ((reach - 0.5 * dx) / dx + 0.5).floor();
+        let bounds: Vec<_> = lattices.iter().map(|lattice| lattice.solid.bounds()).collect();
+        let is_near = |x: [f64; 3]| {
+            bounds.iter().any(|(low, high)| (0..3).all(|a| low[a] - reach < x[a] && x[a] < high[a] + reach))
+        };
+        let surface = WallLattice::new(scene).surface_of_obstacles();
+        let area: f64 = surface.into_iter().filter(|(x, ..)| is_near(*x)).map(|(.., area)| area).sum();
+        sites += area / (dx * dx) * layers;
+    }
     sites.round() as u64
 }
 

@@ -11,6 +11,7 @@ pub mod deadline;
 pub mod dispatch;
 pub mod error;
 pub mod exact;
+pub mod forces;
 pub mod huge_pages;
 pub mod lanes;
 pub mod limits;

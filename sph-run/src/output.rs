@@ -5,16 +5,15 @@ use crate::error::RunError;
 use crate::neighbors::Neighbors;
 use crate::parallel::gather;
 use crate::physics::Physics;
-use crate::report;
 use crate::simulation::{Clock, Simulation};
 use crate::space::Space as _;
 use crate::stabilize::Buffers;
+use crate::{forces, report};
 use formats::folder::RunFolder;
 use formats::outputs::{Index, LONGEST, Segment};
 use formats::scene::Scene;
 use formats::schema::Kept;
 use formats::snapshot::{self, Digests, FileError, Header, Rows};
-use formats::space::Space;
 use formats::{checkpoint, disk};
 use std::fs::{self, File};
 use std::io::Write;
@@ -74,11 +73,13 @@ pub struct Outputs {
 impl Outputs {
     /// Opens them as they were at a checkpoint (`then`), or at the start of a run: what lies beyond is removed, and the
     /// views are made anew.
-    pub fn open(folder: &RunFolder, then: checkpoint::Outputs, space: Space) -> Result<Self, RunError> {
+    pub fn open(folder: &RunFolder, then: checkpoint::Outputs, scene: &Scene) -> Result<Self, RunError> {
         for path in [folder.out(), folder.history_pieces(), folder.log()] {
             fs::create_dir_all(&path).map_err(|error| FileError::writing(&path, 0, &error))?;
         }
-        let head = report::columns(space).join(",") + "\n";
+        let of_obstacles = forces::columns(scene);
+        let columns = report::columns(scene.space).map(String::from);
+        let head = [&columns[..], &of_obstacles[..]].concat().join(",") + "\n";
         let index = Index { segments: then.segments, ..Index::default() };
         let mut history = index.history(folder)?;
         if history.is_empty() {

@@ -176,8 +176,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 }
 
 impl Line {
-    /// The line as it stands in the file.
-    pub fn csv(&self, clock: &crate::simulation::Clock) -> String {
+    /// The line as it stands in the file, with the forces on obstacles.
+    pub fn csv(&self, clock: &crate::simulation::Clock, forces: &[[f64; 3]]) -> String {
         let e = |value: f64| format!("{value:e}");
         let cells = [
             e(clock.time),
@@ -197,6 +197,7 @@ impl Line {
             e(self.max_density),
             self.below_floor.to_string(),
         ];
-        cells.join(",") + "\n"
+        let forces: String = forces.iter().flatten().map(|force| format!(",{force:e}")).collect();
+        cells.join(",") + &forces + "\n"
     }
 }

@@ -87,7 +87,7 @@ impl Job for Run<'_> {
         let then = std::mem::take(&mut self.past.outputs);
         let outputs = agree(self.comm, || {
             self.lock.map_or(Ok(()), RunLock::still_ours)?;
-            Outputs::open(self.folder, then, self.scene.space)
+            Outputs::open(self.folder, then, self.scene)
         })?;
         if rank == 0 && !self.cli.quiet && !self.start.over {
             tell(Level::Note, &format!("pairs in {}", self.numbers()));
@@ -268,7 +268,8 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Course<'_, D, N, P> {
             over |= scene.end.at_rest.is_some_and(|fraction| line.kinetic < fraction * peak);
             self.simulation.clock.peak_kinetic = peak;
             self.simulation.clock.lines += 1;
-            let text = line.csv(&clock);
+            let forces = self.simulation.obstacle_forces();
+            let text = line.csv(&clock, &forces);
             let outputs = &mut self.outputs;
             agree(self.job.comm, || {
                 let Some(outputs) = outputs else { return Ok(()) };

@@ -97,7 +97,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
             p.x[i] = p.x[i] + self.periods.rounded(p.v[i] * dt);
         }
         self.mirrors.keep_inside(p);
-        self.walls.keep_above::<D, N, P::Space>(p, &self.periods, dt);
+        self.walls.keep_out::<D, N, P::Space>(p, &self.periods, dt);
     }
 
     /// Density and stress of some owned particles, in whole blocks, from the velocity gradient.
@@ -171,7 +171,7 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
     }
 
     /// Lays out some particles, and sums the stresses around some owned ones.
-    fn push(&mut self, new: Range<usize>, part: Range<usize>) {
+    pub(crate) fn push(&mut self, new: Range<usize>, part: Range<usize>) {
         let spacing = self.parameters.spacing;
         let mut a = std::mem::take(&mut self.particles.a);
         let mut buffers = std::mem::take(&mut self.buffers);

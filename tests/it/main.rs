@@ -3,6 +3,7 @@
 mod about;
 mod bad_input;
 mod bench;
+mod obstacles;
 mod pages;
 mod same_bits;
 mod terrain;

@@ -6,6 +6,7 @@ mod films;
 mod flows;
 mod fluids;
 mod impacts;
+mod obstacles;
 mod precision;
 mod rest;
 mod slopes;

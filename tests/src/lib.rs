@@ -5,6 +5,7 @@ pub mod damage;
 pub mod python;
 pub mod rasters;
 pub mod shim;
+pub mod solids;
 pub mod trial;
 
 use formats::{folder::RunFolder, snapshot};

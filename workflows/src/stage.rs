@@ -209,8 +209,10 @@ fn changes(folder: &RunFolder, job: &Job) -> Result<Vec<Change>, Failure> {
     let (then, now) = (std::fs::read_to_string(folder.scene()), std::fs::read_to_string(job.scene));
     let reason = match (then, now) {
         (Ok(_), Ok(_)) if !folder.initial().is_file() => "holds a preparation that did not finish".to_owned(),
-        // Where a raster is named, it may have changed under its name.
-        (Ok(then), Ok(now)) if then == now && !now.contains("terrain") => return Ok(Vec::new()),
+        // Where a file is named, it may have changed under its name.
+        (Ok(then), Ok(now)) if then == now && !["terrain", "obstacle"].iter().any(|table| now.contains(table)) => {
+            return Ok(Vec::new());
+        }
         (Ok(then), Ok(now)) => match compared(folder, job, &then, &now) {
             Ok(changes) => return Ok(changes),
             Err(error) => format!("cannot go on with the scene as it is now:\n{error}\n"),

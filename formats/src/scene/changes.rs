@@ -1,8 +1,8 @@
 //! What may change in a scene while a run goes on, and the hash of what may not.
 //!
 //! Both look at the values that the text sets, key by key. Comments, layout, the order of keys and how a quantity is spelt do
-//! not count; the order of bodies and walls does, because particles and wall sites are numbered by it. Defaults are not filled
-//! in: a later version may have keys that this one does not know, and must still find the same hash.
+//! not count; the order of bodies, walls and obstacles does, because particles, wall sites and copies of files are numbered by
+//! it. Defaults are not filled in: a later version may have keys that this one does not know, and must still find the same hash.
 
 use super::{Output, Scene, SceneError, Sources, raw::Faults};
 use crate::{folder::RunFolder, provenance, units};
@@ -16,7 +16,7 @@ use toml::de::{DeTable, DeValue};
 pub const MAY_CHANGE: [&str; 5] = ["title", "end.time", "end.at-rest", "output.snapshots", "output.history"];
 
 /// Tables whose order counts.
-const ORDERED: [&str; 2] = ["body", "wall"];
+const ORDERED: [&str; 3] = ["body", "wall", "obstacle"];
 
 /// A key that has another value than before.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 //! What concerns places (bodies, walls, planes of symmetry) is in [`super::geometry`].
 
 use super::{
-    End, Output, Scene, SceneError, Shape, auto, geometry, held, initial, material, numerics, period,
+    End, Output, Scene, SceneError, Shape, auto, geometry, held, initial, material, numerics, obstacle, period,
     raw::{Allowed, Faults, POSITIVE, Table, values},
     sources::Sources,
     terrain::{self, Terrain},
@@ -84,6 +84,8 @@ fn read(root: Table<'_>, sources: &Sources) -> Option<Checked> {
     if bodies.iter().flatten().any(|body| matches!(body.shape, Shape::Release(_))) {
         initial::on_terrain(&root, initial.as_ref());
     }
+    let relaxes = initial.is_some_and(|initial| initial.relax > 0);
+    let obstacles = obstacle::read(&root, &setting, bodies.as_deref(), walls.as_deref(), relaxes);
     // With a fault in a body or a wall nothing certain can be said.
     let flow = bodies.as_ref().zip(walls.as_ref()).and_then(|(b, w)| held::what_flows(b, w, &setting));
     let periodic = setting.periodic.iter().any(Option::is_some);
@@ -108,6 +110,7 @@ fn read(root: Table<'_>, sources: &Sources) -> Option<Checked> {
         bodies,
         walls: walls?,
         terrain: if setting.has_terrain { Some(setting.terrain?) } else { None },
+        obstacles: obstacles?,
         files: sources.digests(),
         initial: initial?,
         numerics: numerics?,

@@ -14,10 +14,12 @@ mod initial;
 mod law;
 mod material;
 mod numerics;
+mod obstacle;
 mod period;
 mod periodic_axis;
 mod raw;
 mod release;
+mod solids;
 mod sources;
 mod terrain;
 mod walls;
@@ -25,8 +27,10 @@ mod walls;
 pub use auto::{Choice, Chosen};
 pub use changes::{Change, MAY_CHANGE};
 pub use error::{Fault, SceneError};
+pub use obstacle::Obstacle;
 pub use periodic_axis::PeriodicAxis;
 pub use release::{Depth, Release};
+pub use solids::{Inside, Thin};
 pub use sources::Sources;
 pub use terrain::{Terrain, normal};
 pub use walls::{FARTHEST, Parity, Site, WallLattice};
@@ -61,6 +65,8 @@ pub struct Scene {
     pub walls: Vec<Wall>,
     /// A floor of any height.
     pub terrain: Option<Terrain>,
+    /// Fixed solid bodies, in the order of the file.
+    pub obstacles: Vec<Obstacle>,
     /// Files that the scene names, in the order in which they are asked for, and the SHA-256 of what they hold.
     pub files: Vec<(String, String)>,
     /// Stress and disorder at the start.

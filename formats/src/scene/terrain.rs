@@ -23,7 +23,7 @@ pub struct Terrain {
 }
 
 /// Lattice coordinates are kept in 21 bits with sign.
-const MOST_CELLS: f64 = (1u64 << 20) as f64;
+pub(super) const MOST_CELLS: f64 = (1u64 << 20) as f64;
 
 impl Terrain {
     /// Height of the ground, m.

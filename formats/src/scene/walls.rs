@@ -6,8 +6,12 @@
 //! Over a terrain the lattice is sheared: each column along z is moved so that the border between its cells -1 and 0 lies on
 //! the ground. Cells keep their volume, all sites with k < 0 lie below the ground, and none comes nearer to it than half a
 //! spacing along z, so that there are no steps in the floor.
+//!
+//! Obstacles are filled with sites of the lattice that is not sheared. Where a site also lies behind a wall or below the
+//! ground, the wall or the ground has it: without a terrain it is the same site, and does what the wall does; over one, where
+//! the walls' and the ground's sites are others, the obstacle has none there.
 
-use super::{PeriodicAxis, Scene, Slip, Terrain, Wall, WallKind};
+use super::{PeriodicAxis, Scene, Slip, Terrain, Wall, WallKind, solids::Solids};
 use crate::space::Space;
 use std::sync::Arc;
 
@@ -17,27 +21,32 @@ pub const FARTHEST: f64 = 2.7;
 /// Lattice coordinates of a site; unused axes are zero.
 pub type Site = [i32; 3];
 
+/// Over a terrain the sites of obstacles, which are not sheared, are numbered from here along z: less than half of it is what
+/// either kind may have of them (see `obstacle::MOST_LAYERS`).
+const PLAIN: i32 = 1 << 19;
+
 /// Sites behind the walls of a scene.
 #[derive(Clone, Debug)]
 pub struct WallLattice {
     /// Those of kind `virtual` first.
-    walls: Vec<Wall>,
+    pub(super) walls: Vec<Wall>,
     /// How many of them are of that kind: only these have sites.
-    with_sites: usize,
+    pub(super) with_sites: usize,
     axes: &'static [usize],
     origin: [f64; 3],
-    spacing: f64,
-    periods: [Option<PeriodicAxis>; 3],
-    symmetric: [bool; 2],
+    pub(super) spacing: f64,
+    pub(super) periods: [Option<PeriodicAxis>; 3],
+    pub(super) symmetric: [bool; 2],
     space: Space,
-    terrain: Option<Arc<Floor>>,
-    /// No reach may be larger over a terrain, m.
-    farthest: f64,
+    pub(super) terrain: Option<Arc<Floor>>,
+    pub(super) solids: Option<Arc<Solids>>,
+    /// No reach may be larger over a terrain or near an obstacle, m.
+    pub(super) farthest: f64,
 }
 
 /// A terrain, as sites need it.
 #[derive(Debug)]
-struct Floor {
+pub(super) struct Floor {
     terrain: Terrain,
     /// 1/sqrt(1 + s^2) with the steepest slope s within reach of each cell of the raster: no point of the ground is nearer than
     /// the height above it times that.
@@ -60,8 +69,10 @@ pub struct Parity {
     pub motion: [f64; 3],
     /// Is the axis reflected in the stress?
     pub reflected: [bool; 3],
-    /// Normal of a free-slip terrain in which both are reflected before that.
+    /// Normal of a free-slip terrain or obstacle in which both are reflected before that.
     pub normal: Option<[f64; 3]>,
+    /// The obstacle that it belongs to, by number.
+    pub obstacle: Option<usize>,
 }
 
 impl WallLattice {
@@ -83,7 +94,7 @@ impl WallLattice {
         walls.extend(others);
         let periods = [0, 1, 2].map(|axis| scene.periodic_axis(axis));
         let farthest = FARTHEST * scene.h();
-        Self {
+        let mut lattice = Self {
             walls,
             with_sites,
             axes: scene.space.axes(),
@@ -93,8 +104,12 @@ impl WallLattice {
             symmetric: scene.symmetry,
             space: scene.space,
             terrain: scene.terrain.as_ref().map(|terrain| Arc::new(Floor::new(terrain, farthest))),
+            solids: None,
             farthest,
-        }
+        };
+        let lengths = periods.map(|period| period.map(|period| period.length));
+        lattice.solids = Solids::new(&scene.obstacles, lengths, |triangle| lattice.hides(triangle));
+        lattice
     }
 
     /// Where the borders of cells are counted from, m.
@@ -147,7 +162,7 @@ impl WallLattice {
     }
 
     /// Lower bound of the distance to the ground, m; negative below it, infinite without a terrain.
-    fn above_ground(&self, x: [f64; 3]) -> f64 {
+    pub(super) fn above_ground(&self, x: [f64; 3]) -> f64 {
         let Some(floor) = &self.terrain else { return f64::INFINITY };
         let at = self.fold(x);
         let height = x[2] - floor.terrain.height(at[0], at[1]);
@@ -172,10 +187,17 @@ impl WallLattice {
                 home[a] = x[a];
             }
         }
-        if let Some(ground) = self.ground(home) {
+        if self.is_plain(site) {
+            x[2] -= f64::from(PLAIN) * self.spacing;
+        } else if let Some(ground) = self.ground(home) {
             x[2] = ground + (f64::from(site[2]) + 0.5) * self.spacing;
         }
         x
+    }
+
+    /// Is it a site of an obstacle over a terrain?
+    fn is_plain(&self, site: Site) -> bool {
+        self.solids.is_some() && self.terrain.is_some() && site[2] >= PLAIN / 2
     }
 
     /// The site's global number: bit 63 is set, then 21 bits an axis. Ascending order is lexicographic in z, y, x.
@@ -184,20 +206,20 @@ impl WallLattice {
         1 << 63 | part(site[2]) << 42 | part(site[1]) << 21 | part(site[0])
     }
 
-    /// Signed distance of a point to the nearest wall, m: positive on the material's side, infinite without walls. Above a terrain
-    /// it may be less, but is never more.
+    /// Signed distance of a point to the nearest wall, m: positive on the material's side, infinite without walls. Above a terrain,
+    /// and further than [`FARTHEST`] from an obstacle, it may be less, but is never more.
     pub fn distance(&self, x: [f64; 3]) -> f64 {
-        nearest(&self.walls, x).min(self.above_ground(x))
+        nearest(&self.walls, x).min(self.above_ground(x)).min(self.outside_obstacles(x))
     }
 
     /// The same to the nearest wall that has sites.
     pub fn distance_of_sites(&self, x: [f64; 3]) -> f64 {
-        nearest(&self.walls[..self.with_sites], x).min(self.above_ground(x))
+        nearest(&self.walls[..self.with_sites], x).min(self.above_ground(x)).min(self.outside_obstacles(x))
     }
 
     /// Is there a wall that has sites?
     pub fn has_sites(&self) -> bool {
-        self.with_sites > 0 || self.terrain.is_some()
+        self.with_sites > 0 || self.terrain.is_some() || self.solids.is_some()
     }
 
     /// The walls with sites that a point lies behind.
@@ -210,7 +232,8 @@ impl WallLattice {
     /// the corrections that only shear components with one normal index change sign, and that a wall may slide along
     /// itself with a velocity V; in the corner of two no-slip walls V is the mean of theirs).
     pub fn parity(&self, x: [f64; 3]) -> Parity {
-        let mut parity = Parity { velocity: [1.0; 3], motion: [0.0; 3], reflected: [false; 3], normal: None };
+        let mut parity =
+            Parity { velocity: [1.0; 3], motion: [0.0; 3], reflected: [false; 3], normal: None, obstacle: None };
         let mut stuck = 0.0;
         if let Some(floor) = &self.terrain
             && self.above_ground(x) < 0.0
@@ -232,6 +255,18 @@ impl WallLattice {
                     parity.velocity[wall.axis] = -1.0;
                     parity.reflected[wall.axis] = true;
                 }
+            }
+        }
+        if stuck == 0.0
+            && parity.normal.is_none()
+            && !parity.reflected.contains(&true)
+            && let Some(inside) = self.inside_obstacle(x)
+        {
+            parity.obstacle = Some(inside.obstacle);
+            if inside.smooth {
+                parity.normal = Some(inside.normal);
+            } else {
+                stuck = 1.0;
             }
         }
         if stuck > 0.0 {
@@ -257,7 +292,7 @@ impl WallLattice {
 
     /// Calls `visit` for every wall site within `reach` of `x`.
     pub fn near(&self, x: [f64; 3], reach: f64, mut visit: impl FnMut(Site)) {
-        debug_assert!(self.terrain.is_none() || reach <= self.farthest);
+        debug_assert!((self.terrain.is_none() && self.solids.is_none()) || reach <= self.farthest);
         if self.distance_of_sites(x) >= reach {
             return;
         }
@@ -267,16 +302,27 @@ impl WallLattice {
             low[a] = (s - reach / self.spacing).ceil() as i32;
             high[a] = (s + reach / self.spacing).floor() as i32;
         }
+        let near_solid = self.solids.is_some() && self.outside_obstacles(x) < reach;
+        let mut up = 0;
         if self.terrain.is_some() {
-            return self.near_terrain(x, reach, [low, high], visit);
+            self.near_terrain(x, reach, [low, high], &mut visit);
+            if !near_solid {
+                return;
+            }
+            up = PLAIN;
         }
         for k in low[2]..=high[2] {
             for j in low[1]..=high[1] {
                 for i in low[0]..=high[0] {
-                    let site = [i, j, k];
+                    let site = [i, j, k + up];
                     let p = self.position(site);
                     let r2: f64 = self.axes.iter().map(|&a| (p[a] - x[a]).powi(2)).sum();
-                    if r2 < reach * reach && self.distance_of_sites(p) < 0.0 {
+                    if r2 >= reach * reach {
+                        continue;
+                    }
+                    let behind = nearest(&self.walls[..self.with_sites], p) < 0.0;
+                    // Over a terrain what lies behind a wall has been visited.
+                    if (behind && up == 0) || (!behind && near_solid && self.is_in_obstacle(site, p)) {
                         visit(site);
                     }
                 }
@@ -334,10 +380,21 @@ mod tests {
     #[test]
     fn walls_turn_what_is_extrapolated() {
         let smooth = lattice(&format!("{FLOOR}{SIDE}\"free-slip\"\n"));
-        let moving = Parity { velocity: [-1.0; 3], motion: [1.0, 0.0, 0.0], reflected: [false; 3], normal: None };
+        let moving = Parity {
+            velocity: [-1.0; 3],
+            motion: [1.0, 0.0, 0.0],
+            reflected: [false; 3],
+            normal: None,
+            obstacle: None,
+        };
         assert_eq!(smooth.parity([0.05, 0.0, -0.01]), moving);
-        let side =
-            Parity { velocity: [-1.0, 1.0, 1.0], motion: [0.0; 3], reflected: [true, false, false], normal: None };
+        let side = Parity {
+            velocity: [-1.0, 1.0, 1.0],
+            motion: [0.0; 3],
+            reflected: [true, false, false],
+            normal: None,
+            obstacle: None,
+        };
         assert_eq!(smooth.parity([0.11, 0.0, 0.05]), side);
         let corner = Parity { velocity: [1.0, -1.0, -1.0], reflected: side.reflected, ..moving };
         assert_eq!(smooth.parity([0.11, 0.0, -0.01]), corner);

@@ -9,6 +9,7 @@ mod failure_plane;
 mod flow;
 mod front;
 mod layers;
+mod outline;
 mod panels;
 mod particles;
 mod profiles;

@@ -2,7 +2,7 @@
 
 use super::{
     canvas::{self, Frame, MARGIN, SMALL, viridis},
-    title,
+    outline, title,
 };
 use crate::{analysis::Analysis, failure::Failure, terrain::Maps};
 use plotters::{
@@ -75,6 +75,10 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
                 let on = |p: [f64; 2]| (inner[0] + (p[0] - x[0]) * scale, inner[3] - (p[1] - y[0]) * scale);
                 let pen = canvas::pen(RGBColor(110, 100, 90), 0.6);
                 canvas::polyline(area, &[on(ends[0]), on(ends[1])], pen, false)?;
+            }
+            for ends in outline::of_obstacles(a, 1.0, [x, y]) {
+                let on = |p: [f64; 2]| (inner[0] + (p[0] - x[0]) * scale, inner[3] - (p[1] - y[0]) * scale);
+                canvas::polyline(area, &ends.map(on), canvas::pen(outline::COLOUR, 1.0), false)?;
             }
             let bar = [top + 10.0, (top + 10.0 + size[1].min(240.0)).max(top + 110.0)];
             canvas::colour_bar(area, left + size[0] + 16.0, bar, [0.0, most.max(1e-9)], &format!("({unit})"))?;

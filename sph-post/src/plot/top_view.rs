@@ -1,7 +1,7 @@
 //! Height of the surface seen from above, in three dimensions.
 
 use super::canvas::{self, Frame, MARGIN, SMALL, viridis};
-use super::{Lengths, Times, title};
+use super::{Lengths, Times, outline, title};
 use crate::{
     analysis::{Analysis, spread},
     deposit::Map,
@@ -90,6 +90,10 @@ pub fn draw(a: &Analysis, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
                 if px > inner[0] && px < inner[2] && py > inner[1] && py < inner[3] {
                     area.draw(&Rectangle::new([low, high], viridis(f64::from(shade) / SHADES).filled()))?;
                 }
+            }
+            for ends in outline::of_obstacles(a, lengths.unit, [x, y]) {
+                let on = |p: [f64; 2]| (inner[0] + (p[0] - x[0]) * scale, inner[3] - (p[1] - y[0]) * scale);
+                canvas::polyline(area, &ends.map(on), canvas::pen(outline::COLOUR, 1.0), false)?;
             }
         }
         let bar = [

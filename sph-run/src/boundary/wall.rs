@@ -22,12 +22,14 @@ pub struct Walls {
     lattice: WallLattice,
     volume: f64,
     parities: Vec<Parity>,
+    /// Owned particles that may come to an obstacle before the next build of the lists.
+    near_obstacles: Vec<u32>,
 }
 
 impl Walls {
     /// For walls on `lattice`, whose particles have the given volume dx^D.
     pub fn new(lattice: WallLattice, volume: f64) -> Self {
-        Self { lattice, volume, parities: Vec::new() }
+        Self { lattice, volume, parities: Vec::new(), near_obstacles: Vec::new() }
     }
 
     /// Are there walls of virtual particles at all?
@@ -57,31 +59,36 @@ impl Walls {
         (of, widest)
     }
 
-    /// Puts owned particles back that have come below a terrain in a drift of length `dt`: the virtual particles carry what is
-    /// dense, but not what flies alone. They lose the velocity into the ground and, unless that is smooth, as much of that along
-    /// it; nothing moves further than it would have gone without the ground.
-    pub fn keep_above<const D: usize, const N: usize, S: Space<D, N>>(
+    /// How many obstacles there are.
+    pub fn obstacles(&self) -> usize {
+        self.lattice.obstacles()
+    }
+
+    /// The obstacle of every wall particle, in their order: those of walls have none.
+    pub fn of_obstacles(&self) -> impl Iterator<Item = Option<usize>> {
+        self.parities.iter().map(|parity| parity.obstacle)
+    }
+
+    /// Puts owned particles back that have come below a terrain or into an obstacle in a drift of length `dt`: the virtual
+    /// particles carry what is dense, but not what flies alone. They lose the velocity into it and, unless it is smooth, as much
+    /// of that along it; nothing moves further than it would have gone without it.
+    pub fn keep_out<const D: usize, const N: usize, S: Space<D, N>>(
         &self,
         p: &mut Particles<D, N>,
         periods: &Periods<D>,
         dt: f64,
     ) {
-        if !self.lattice.has_terrain() {
-            return;
-        }
-        for i in 0..p.owned {
-            let Some((n, depth, smooth)) = self.lattice.below_ground(S::to_disk(p.x[i])) else { continue };
-            let v = S::to_disk(p.v[i]);
-            let into: f64 = -(0..3).map(|a| v[a] * n[a]).sum::<f64>();
-            if into <= 0.0 {
-                continue;
+        if self.lattice.has_terrain() {
+            for i in 0..p.owned {
+                if let Some((n, depth, smooth)) = self.lattice.below_ground(S::to_disk(p.x[i])) {
+                    put_back::<D, N, S>(p, i, (n, depth, smooth), periods, dt);
+                }
             }
-            let back = depth.min(2.0 * into * dt);
-            p.x[i] += periods.rounded(S::from_disk(n.map(|n| n * back)));
-            let along = [0, 1, 2].map(|a| v[a] + into * n[a]);
-            let speed = along.iter().map(|v| v * v).sum::<f64>().sqrt();
-            let kept = if smooth { 1.0 } else { (1.0 - into / speed.max(into)).max(0.0) };
-            p.v[i] = S::from_disk(along.map(|v| v * kept));
+        }
+        for i in self.near_obstacles.iter().map(|&i| i as usize) {
+            if let Some(inside) = self.lattice.inside_obstacle(S::to_disk(p.x[i])) {
+                put_back::<D, N, S>(p, i, (inside.normal, inside.depth, inside.smooth), periods, dt);
+            }
         }
     }
 
@@ -98,6 +105,8 @@ impl Walls {
                 limit = limit.max(2 * sites.len());
             }
         }
+        let near = |x: Vector<D>| self.lattice.outside_obstacles(S::to_disk(x)) < reach;
+        self.near_obstacles = (0..p.owned as u32).filter(|&i| near(p.x[i as usize])).collect();
         unique(&mut sites);
         self.parities.clear();
         let places: Vec<[f64; 3]> = sites.iter().map(|&(_, site)| self.lattice.position(site)).collect();
@@ -148,6 +157,27 @@ impl Walls {
             *kept = S::stress_from_disk(reflect_stress(stress, parity.reflected));
         }
     }
+}
+
+/// Puts a particle back that has come through a surface of this normal, and is so deep behind it.
+fn put_back<const D: usize, const N: usize, S: Space<D, N>>(
+    p: &mut Particles<D, N>,
+    i: usize,
+    (n, depth, smooth): ([f64; 3], f64, bool),
+    periods: &Periods<D>,
+    dt: f64,
+) {
+    let v = S::to_disk(p.v[i]);
+    let into: f64 = -(0..3).map(|a| v[a] * n[a]).sum::<f64>();
+    if into <= 0.0 {
+        return;
+    }
+    let back = depth.min(2.0 * into * dt);
+    p.x[i] += periods.rounded(S::from_disk(n.map(|n| n * back)));
+    let along = [0, 1, 2].map(|a| v[a] + into * n[a]);
+    let speed = along.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let kept = if smooth { 1.0 } else { (1.0 - into / speed.max(into)).max(0.0) };
+    p.v[i] = S::from_disk(along.map(|v| v * kept));
 }
 
 /// v - 2 (v.n) n

@@ -73,8 +73,9 @@ impl Scene {
         let space = text_at(document.get_ref(), &["space"])?.to_string();
         let may_be_less = space == Space::ThreeD.name()
             || space == Space::PlaneStrain.name() && !has(document.get_ref(), &["symmetry"]);
-        // On a terrain nothing can be left out, and rasters are large.
-        if !errors.is_empty() || !may_be_less || has(document.get_ref(), &["terrain"]) {
+        // With a terrain or obstacles nothing can be left out, and their files are large.
+        let has_files = ["terrain", "obstacle"].iter().any(|key| has(document.get_ref(), &[key]));
+        if !errors.is_empty() || !may_be_less || has_files {
             return None;
         }
         let names_planes = has(document.get_ref(), &["symmetry"]);

@@ -118,9 +118,7 @@ pub(super) fn mirrored(scene: &Scene, axis: usize) -> Result<Reduction, String> 
     if scene.periodic[axis].is_some() {
         return Err(format!("it repeats itself along {name}"));
     }
-    if scene.terrain.is_some() {
-        return Err("there is a terrain".into());
-    }
+    no_ground_nor_obstacles(scene)?;
     if scene.gravity[axis] != 0.0 {
         return Err(format!("gravity has a component along {name}"));
     }
@@ -147,10 +145,19 @@ pub(super) fn mirrored(scene: &Scene, axis: usize) -> Result<Reduction, String> 
     Ok(Reduction { name: super::PLANES[axis], flat: None, edits })
 }
 
-fn no_ground_nor_sideways_pull(scene: &Scene, axes: &[usize]) -> Result<(), String> {
+/// Of neither is it known here what is symmetric about it.
+fn no_ground_nor_obstacles(scene: &Scene) -> Result<(), String> {
     if scene.terrain.is_some() {
         return Err("there is a terrain".into());
     }
+    match scene.obstacles.first() {
+        Some(obstacle) => Err(format!("there is an obstacle, `{}`", obstacle.name)),
+        None => Ok(()),
+    }
+}
+
+fn no_ground_nor_sideways_pull(scene: &Scene, axes: &[usize]) -> Result<(), String> {
+    no_ground_nor_obstacles(scene)?;
     for &a in axes {
         let name = AXES[a];
         if scene.gravity[a] != 0.0 {
