@@ -42,8 +42,10 @@ pub fn png(chart: &Chart, points: &Points) -> Result<Vec<u8>, String> {
 }
 
 fn draw(chart: &Chart, points: &Points) -> Paper {
-    let front: Vec<&Point> = points.done.iter().filter(|point| point.rank == Rank::Front).collect();
-    let told = MARGIN[1] + LINE * (front.len() + 9) as f64 + 10.0;
+    let of = |is: &dyn Fn(&&Point) -> bool| points.done.iter().filter(is).collect::<Vec<&Point>>();
+    let front = of(&|point| point.is_front());
+    let others = of(&|point| point.is_other_front());
+    let told = MARGIN[1] + LINE * (front.len() + others.len() + 11) as f64 + 10.0;
     let height = told.max(MARGIN[1] + INSIDE[1] + MARGIN[3]);
     let mut paper = Paper::new([MARGIN[0] + INSIDE[0] + MARGIN[2], height]);
     let x = Axis::new(points.done.iter().map(|p| p.cost[0]), true);
@@ -59,6 +61,11 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
         let [left, at] = place(x.range[0], level);
         paper.line(&[[left, at], [left + INSIDE[0], at]], COLOURS[2], 1.4, "7 4");
     }
+    // Where both fronts are the same, that of the scene's own material hides the other.
+    let of_all = staircase(&of(&|point| point.of_all == Rank::Front), &place, [&x, &y]);
+    if !others.is_empty() {
+        paper.line(&of_all, COLOURS[3], 1.4, "5 3");
+    }
     let stairs = staircase(&front, &place, [&x, &y]);
     paper.line(&stairs, COLOURS[4], 2.2, "");
     let base: Vec<[f64; 2]> =
@@ -66,24 +73,30 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
     paper.line(&base, INK, 1.0, "3 3");
     // Pale ones first, so that those that matter lie above.
     let mut order: Vec<&Point> = points.done.iter().collect();
-    order.sort_by_key(|point| (std::cmp::Reverse(point.rank), point.is_base()));
-    let (mut taken, mut lines): (Vec<Box4>, Vec<Box4>) = (Vec::new(), stairs.windows(2).map(around).collect());
+    order.sort_by_key(|point| (!point.is_behind(), point.is_front(), point.is_base()));
+    let (mut taken, mut lines): (Vec<Box4>, Vec<Box4>) = (Vec::new(), Vec::new());
+    lines.extend(stairs.windows(2).chain(of_all.windows(2)).map(around));
     for point in &order {
         let at = place(point.cost[0], point.error[0]);
         let (shape, colour, _) = look(point);
-        let is_pale = point.rank == Rank::Behind && !point.is_base();
+        let is_pale = point.is_behind() && !point.is_base();
         let ends = [-1.0, 1.0].map(|side| place(point.cost[0], point.error[0] + side * point.error[1]));
-        let width = if point.rank == Rank::Front { 1.6 } else { 0.8 };
+        let width = if point.is_front() { 1.6 } else { 0.8 };
         paper.line(&ends, if is_pale { GRID } else { colour }, width, "");
-        paper.marker(at, shape, if is_pale { PALE } else { colour });
+        let colour = if is_pale { PALE } else { colour };
+        match point.is_other() {
+            true => paper.hollow(at, shape, colour),
+            false => paper.marker(at, shape, colour),
+        }
         if !is_pale {
             lines.push(around(&ends));
         }
         taken.push([at[0] - HALF, at[1] - HALF, at[0] + HALF, at[1] + HALF]);
     }
     let labels = front.iter().enumerate().map(|(k, point)| ((k + 1).to_string(), *point));
-    let sizes = points.done.iter().filter(|p| p.is_base() && p.rank != Rank::Front);
-    let all = labels.chain(sizes.map(|point| (format!("d{}", point.resolution), point)));
+    let letters = others.iter().enumerate().map(|(k, point)| (letter(k), *point));
+    let sizes = points.done.iter().filter(|p| p.is_base() && !p.is_front());
+    let all = labels.chain(letters).chain(sizes.map(|point| (format!("d{}", point.resolution), point)));
     for (text, point) in all {
         let at = place(point.cost[0], point.error[0]);
         // Best where no line is either.
@@ -94,8 +107,14 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
             taken.push(corner);
         }
     }
-    legend(&mut paper, &front, reference.is_some());
+    legend(&mut paper, &front, &others, reference.is_some());
     paper
+}
+
+/// `a`, `b` and so on; after `z` comes `a2`.
+fn letter(k: usize) -> String {
+    let letter = char::from(b'a' + (k % 26) as u8);
+    if k < 26 { letter.to_string() } else { format!("{letter}{}", k / 26 + 1) }
 }
 
 fn frame(paper: &mut Paper, chart: &Chart, [x, y]: [&Axis; 2]) {
@@ -153,7 +172,7 @@ fn free(text: &str, [x, y]: [f64; 2], taken: &[Box4]) -> Option<Box4> {
     })
 }
 
-fn legend(paper: &mut Paper, front: &[&Point], reference: bool) {
+fn legend(paper: &mut Paper, front: &[&Point], others: &[&Point], reference: bool) {
     let left = MARGIN[0] + INSIDE[0] + 14.0;
     let mut at = MARGIN[1] + 8.0 - LINE;
     let mut next = || {
@@ -170,14 +189,24 @@ fn legend(paper: &mut Paper, front: &[&Point], reference: bool) {
     paper.text("dominated beyond the scatter", [left + 26.0, y], Anchor::Start);
     let y = next();
     paper.line(&[[left, y], [left + 20.0, y]], COLOURS[4], 2.2, "");
-    paper.text("front:", [left + 26.0, y], Anchor::Start);
-    for (k, point) in front.iter().enumerate() {
-        let y = next();
-        paper.text(&format!("{}", k + 1), [left + 20.0, y], Anchor::End);
+    paper.text("front of the scene's own material:", [left + 26.0, y], Anchor::Start);
+    let entry = |paper: &mut Paper, y: f64, name: &str, point: &Point| {
+        paper.text(name, [left + 20.0, y], Anchor::End);
         let mark = if point.level { "~ " } else { "" };
         paper.text(&format!("{mark}{}", point.label()), [left + 26.0, y], Anchor::Start);
+    };
+    for (k, point) in front.iter().enumerate() {
+        entry(paper, next(), &(k + 1).to_string(), point);
     }
-    if front.iter().any(|point| point.level) {
+    if !others.is_empty() {
+        let y = next();
+        paper.line(&[[left, y], [left + 20.0, y]], COLOURS[3], 1.4, "5 3");
+        paper.text("and with other materials (hollow):", [left + 26.0, y], Anchor::Start);
+    }
+    for (k, point) in others.iter().enumerate() {
+        entry(paper, next(), &letter(k), point);
+    }
+    if front.iter().chain(others).any(|point| point.level) {
         paper.text("~ within the scatter of a cheaper one", [left + 26.0, next()], Anchor::Start);
     }
     if reference {
