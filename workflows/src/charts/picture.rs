@@ -17,6 +17,8 @@ const INSIDE: [f64; 2] = [560.0, 400.0];
 const MARGIN: [f64; 4] = [80.0, 14.0, 330.0, 56.0];
 /// Of a line of the legend.
 const LINE: f64 = 18.0;
+/// Of the legend, beside those of the fronts.
+const MORE_LINES: usize = 8;
 /// Of those that are not on the front.
 const PALE: &str = "#c4c4c4";
 /// Half of the side of what a marker takes.
@@ -45,7 +47,7 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
     let of = |is: &dyn Fn(&&Point) -> bool| points.done.iter().filter(is).collect::<Vec<&Point>>();
     let front = of(&|point| point.is_front());
     let others = of(&|point| point.is_other_front());
-    let told = MARGIN[1] + LINE * (front.len() + others.len() + 11) as f64 + 10.0;
+    let told = MARGIN[1] + LINE * (front.len() + others.len() + MORE_LINES) as f64 + 10.0;
     let height = told.max(MARGIN[1] + INSIDE[1] + MARGIN[3]);
     let mut paper = Paper::new([MARGIN[0] + INSIDE[0] + MARGIN[2], height]);
     let x = Axis::new(points.done.iter().map(|p| p.cost[0]), true);
@@ -103,12 +105,22 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
         let clear = [&taken[..], &lines].concat();
         if let Some(corner) = free(&text, at, &clear).or_else(|| free(&text, at, &taken)) {
             let middle = [0.5 * (corner[0] + corner[2]), 0.5 * (corner[1] + corner[3])];
+            if let Some(line) = leader(at, &corner) {
+                paper.line(&line, INK, 0.6, "");
+            }
             paper.text(&text, middle, Anchor::Middle);
             taken.push(corner);
         }
     }
     legend(&mut paper, &front, &others, reference.is_some());
     paper
+}
+
+/// From a marker to its label, where that had to go farther away than the next one might be.
+fn leader(at: [f64; 2], label: &Box4) -> Option<[[f64; 2]; 2]> {
+    let nearest = [at[0].clamp(label[0], label[2]), at[1].clamp(label[1], label[3])];
+    let far = (nearest[0] - at[0]).hypot(nearest[1] - at[1]);
+    (far > 1.5 * HALF).then_some([at, nearest])
 }
 
 /// `a`, `b` and so on; after `z` comes `a2`.
@@ -228,6 +240,11 @@ mod tests {
         assert!(first[2] <= marker[0] && first[1] >= marker[3], "{first:?}");
         let second = free("12", at, &[marker, first]).unwrap();
         assert_ne!(first, second);
+        // The second one is beside the marker still; where only a farther place is free, a line leads there.
+        assert!(leader(at, &first).is_none() && leader(at, &second).is_none());
+        let far = free("12", at, &[[274.0, 174.0, 326.0, 214.0]]).unwrap();
+        assert!(far[1] > 214.0 && leader(at, &far).is_some(), "{far:?}");
+        assert_eq!(leader(at, &[320.0, 190.0, 330.0, 210.0]), Some([at, [320.0, 200.0]]));
         let crowd: Vec<Box4> = vec![[0.0, 0.0, 1000.0, 1000.0]];
         assert_eq!(free("12", at, &crowd), None);
     }
