@@ -113,13 +113,19 @@ fn verdict(chart: &Chart, points: &Points) -> String {
         }
     }
     let behind = points.done.iter().filter(|p| p.is_base() && p.is_behind());
-    let pairs: Vec<(&Point, &Point)> = behind.filter_map(|p| Some((best_instead(points, p)?, p))).collect();
-    for group in pairs.chunk_by(|a, b| std::ptr::eq(a.0, b.0)) {
-        let better = group[0].0;
+    let mut groups: Vec<(&Point, Vec<&Point>)> = Vec::new();
+    for base in behind {
+        let Some(better) = best_instead(points, base) else { continue };
+        match groups.iter_mut().find(|(known, _)| std::ptr::eq(*known, better)) {
+            Some((_, group)) => group.push(base),
+            None => groups.push((better, vec![base])),
+        }
+    }
+    for (better, group) in groups {
         let of = |p: &Point| format!("{} ± {} in {} s", short(p.error[0]), short(p.error[1]), short(p.cost[0]));
         let is_judged = |p: &Point| chart.error.reference.is_none_or(|reference| p.error[0] > reference);
         let mark = |p: &Point| if is_judged(p) { "" } else { " (below what the reference can judge)" };
-        let each = group.iter().map(|(_, p)| format!("with resolution {} {}{}", p.resolution, of(p), mark(p)));
+        let each = group.iter().map(|p| format!("with resolution {} {}{}", p.resolution, of(p), mark(p)));
         let each = each.collect::<Vec<_>>().join(", ");
         let _ = writeln!(text, "- *{}* (an error of {}) dominates the default: {each}.", better.label(), of(better));
     }

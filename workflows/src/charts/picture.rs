@@ -13,12 +13,14 @@ use crate::study::{
 
 /// Of the inside, pixels.
 const INSIDE: [f64; 2] = [560.0, 400.0];
-/// Room left of it, above it, right of it, and below it.
+/// Room left of it, above it, right of it at least, and below it.
 const MARGIN: [f64; 4] = [80.0, 14.0, 330.0, 56.0];
 /// Of a line of the legend.
 const LINE: f64 = 18.0;
+/// Of a character of the legend, in the mean.
+const CHARACTER: f64 = 7.0;
 /// Of the legend, beside those of the fronts.
-const MORE_LINES: usize = 8;
+const MORE_LINES: usize = 9;
 /// Of those that are not on the front.
 const PALE: &str = "#c4c4c4";
 /// Half of the side of what a marker takes.
@@ -49,7 +51,9 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
     let others = of(&|point| point.is_other_front());
     let told = MARGIN[1] + LINE * (front.len() + others.len() + MORE_LINES) as f64 + 10.0;
     let height = told.max(MARGIN[1] + INSIDE[1] + MARGIN[3]);
-    let mut paper = Paper::new([MARGIN[0] + INSIDE[0] + MARGIN[2], height]);
+    let longest = front.iter().chain(&others).map(|point| point.label().chars().count()).max().unwrap_or(0);
+    let right = MARGIN[2].max(56.0 + CHARACTER * longest as f64);
+    let mut paper = Paper::new([MARGIN[0] + INSIDE[0] + right, height]);
     let x = Axis::new(points.done.iter().map(|p| p.cost[0]), true);
     let reference = chart.error.reference.filter(|r| points.done.iter().any(|p| p.error[0] < 1.5 * r));
     let errors = points.done.iter().flat_map(|p| [p.error[0], p.error[0] + p.error[1]]).chain(reference);
@@ -173,7 +177,7 @@ fn free(text: &str, [x, y]: [f64; 2], taken: &[Box4]) -> Option<Box4> {
     let inside =
         |b: &Box4| b[0] > MARGIN[0] && b[1] > MARGIN[1] && b[2] < MARGIN[0] + INSIDE[0] && b[3] < MARGIN[1] + INSIDE[1];
     let apart = |a: &Box4, b: &Box4| a[2] <= b[0] || b[2] <= a[0] || a[3] <= b[1] || b[3] <= a[1];
-    [0.0, 6.0, 14.0].into_iter().find_map(|gap| {
+    [0.0, 6.0, 14.0, 24.0, 36.0].into_iter().find_map(|gap| {
         let (dx, dy) = (HALF + gap + 0.5 * width, HALF + gap + 0.5 * height);
         let sides = [[-dx, dy], [dx, -dy], [-dx, -dy], [dx, dy], [-dx, 0.0], [dx, 0.0], [0.0, dy], [0.0, -dy]];
         let boxes = sides.map(|[a, b]| {
@@ -200,6 +204,9 @@ fn legend(paper: &mut Paper, front: &[&Point], others: &[&Point], reference: boo
     paper.marker([left + 10.0, y], 0, PALE);
     paper.text("dominated beyond the scatter", [left + 26.0, y], Anchor::Start);
     let y = next();
+    paper.hollow([left + 10.0, y], 0, INK);
+    paper.text("hollow: of another material", [left + 26.0, y], Anchor::Start);
+    let y = next();
     paper.line(&[[left, y], [left + 20.0, y]], COLOURS[4], 2.2, "");
     paper.text("front of the scene's own material:", [left + 26.0, y], Anchor::Start);
     let entry = |paper: &mut Paper, y: f64, name: &str, point: &Point| {
@@ -213,7 +220,7 @@ fn legend(paper: &mut Paper, front: &[&Point], others: &[&Point], reference: boo
     if !others.is_empty() {
         let y = next();
         paper.line(&[[left, y], [left + 20.0, y]], COLOURS[3], 1.4, "5 3");
-        paper.text("and with other materials (hollow):", [left + 26.0, y], Anchor::Start);
+        paper.text("and with other materials:", [left + 26.0, y], Anchor::Start);
     }
     for (k, point) in others.iter().enumerate() {
         entry(paper, next(), &letter(k), point);
