@@ -67,6 +67,9 @@ pub struct Error {
 pub struct Choice {
     /// A series.
     pub name: String,
+    /// Do its options make another material, one that the scene's author has not asked for?
+    #[serde(default)]
+    pub material: bool,
     /// At least one.
     #[serde(rename = "option")]
     pub options: Vec<Setting>,
@@ -111,6 +114,8 @@ pub struct Pairs {
     pub most: usize,
     /// At this resolution.
     pub resolution: f64,
+    /// The best of the scene's own material also at this one.
+    pub lower: Option<f64>,
     /// Lattices.
     pub seeds: u32,
 }
@@ -260,8 +265,13 @@ impl Chart {
         Some((k, self.choices[k].options.iter().find(|option| option.name == name)?))
     }
 
+    /// Has a setting, an option or two with ` and ` between them, another material than the base?
+    pub fn is_other_material(&self, setting: &str) -> bool {
+        setting.split(" and ").filter_map(|name| self.option(name)).any(|(k, _)| self.choices[k].material)
+    }
+
     /// The runs of two options together. A fault where they do not go together, such as two laws or a key the other law has not.
-    pub fn pair(&self, first: &str, second: &str) -> Result<Vec<Run>, String> {
+    pub fn pair(&self, first: &str, second: &str, resolutions: &[f64]) -> Result<Vec<Run>, String> {
         let option = |name: &str| self.option(name).ok_or_else(|| format!("there is no option `{name}`"));
         let ((one, first), (other, second)) = (option(first)?, option(second)?);
         if one == other {
@@ -270,7 +280,7 @@ impl Chart {
         if first.instead.keys().any(|file| second.instead.contains_key(file)) {
             return Err(format!("`{}` and `{}` replace the same file", first.name, second.name));
         }
-        self.runs(PAIRS, &[first, second], &[self.pairs.resolution], self.pairs.seeds)
+        self.runs(PAIRS, &[first, second], resolutions, self.pairs.seeds)
     }
 
     /// The runs of a setting, of none for the base.

@@ -52,12 +52,18 @@ pub fn dataset(chart: &Chart, points: &Points) -> Dataset {
     put("particles", "material particles", "1", of(&|p| p.particles as f64));
     put("resolution", "particles over the length of the case", "1", of(&|p| p.resolution));
     put("lattices", "disturbed lattices in the means", "1", of(&|p| p.count as f64));
-    put("on_front", "1 on the Pareto front of error and cost, else 0", "1", of(&|p| is(p, Rank::Front)));
-    put("near_front", "1 within the scatter of the front, else 0", "1", of(&|p| is(p, Rank::Near)));
-    put("default_setting", "1 where nothing is changed, else 0", "1", of(&|p| f64::from(u8::from(p.is_base()))));
+    let own = |is: Rank| of(&|p| flag(p.rank == Some(is)));
+    let all = |is: Rank| of(&|p| flag(p.of_all == is));
+    let front = "1 on the Pareto front of error and cost among the settings of the scene's own material, else 0";
+    put("on_front", front, "1", own(Rank::Front));
+    put("near_front", "1 within the scatter of that front, else 0", "1", own(Rank::Near));
+    put("on_front_of_all", "1 on the Pareto front of error and cost among all settings, else 0", "1", all(Rank::Front));
+    put("near_front_of_all", "1 within the scatter of the front of all settings, else 0", "1", all(Rank::Near));
+    put("other_material", "1 of another material than the scene, else 0", "1", of(&|p| flag(p.is_other())));
+    put("default_setting", "1 where nothing is changed, else 0", "1", of(&|p| flag(p.is_base())));
     data
 }
 
-fn is(point: &Point, rank: Rank) -> f64 {
-    f64::from(u8::from(point.rank == rank))
+fn flag(is: bool) -> f64 {
+    f64::from(u8::from(is))
 }

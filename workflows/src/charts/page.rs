@@ -61,7 +61,7 @@ pub fn part(chart: &Chart, results: &Results, points: &Points) -> String {
         return text + "\n\n*Not run.*\n";
     }
     let _ = write!(text, "\n\n![{}]({}.png)\n\n", chart.study.title, chart.study.name);
-    text += &verdict(points);
+    text += &verdict(chart, points);
     let runs: Vec<_> = chart.study.runs.iter().collect();
     let machine = super::machine(chart);
     let _ = writeln!(text, "\n{} settings. {} On {machine}.\n", points.done.len(), table::provenance(results, &runs));
@@ -98,10 +98,11 @@ fn all(chart: &Chart, points: &Points) -> String {
     text
 }
 
-/// Where the default lies, at each resolution: which point of the front is better, and by how much.
-fn verdict(points: &Points) -> String {
+/// Where the default lies among the settings of its own material, at each resolution: which point of the front is better, and by how much.
+/// Then what other materials have on the front of all settings.
+fn verdict(chart: &Chart, points: &Points) -> String {
     let list = |rank: Rank| {
-        let of = points.done.iter().filter(|p| p.is_base() && p.rank == rank).map(|p| p.resolution.to_string());
+        let of = points.done.iter().filter(|p| p.is_base() && p.rank == Some(rank)).map(|p| p.resolution.to_string());
         of.collect::<Vec<_>>()
     };
     let mut text = String::new();
@@ -111,21 +112,33 @@ fn verdict(points: &Points) -> String {
             let _ = writeln!(text, "- The default is {words} with resolution {}.", found.join(", "));
         }
     }
-    let behind = points.done.iter().filter(|p| p.is_base() && p.rank == Rank::Behind);
-    let pairs: Vec<(&Point, &Point)> = behind.filter_map(|p| Some((best_instead(points, p)?, p))).collect();
-    for group in pairs.chunk_by(|a, b| std::ptr::eq(a.0, b.0)) {
-        let better = group[0].0;
+    let behind = points.done.iter().filter(|p| p.is_base() && p.is_behind());
+    let mut groups: Vec<(&Point, Vec<&Point>)> = Vec::new();
+    for base in behind {
+        let Some(better) = best_instead(points, base) else { continue };
+        match groups.iter_mut().find(|(known, _)| std::ptr::eq(*known, better)) {
+            Some((_, group)) => group.push(base),
+            None => groups.push((better, vec![base])),
+        }
+    }
+    for (better, group) in groups {
         let of = |p: &Point| format!("{} ± {} in {} s", short(p.error[0]), short(p.error[1]), short(p.cost[0]));
-        let each = group.iter().map(|(_, base)| format!("with resolution {} {}", base.resolution, of(base)));
+        let is_judged = |p: &Point| chart.error.reference.is_none_or(|reference| p.error[0] > reference);
+        let mark = |p: &Point| if is_judged(p) { "" } else { " (below what the reference can judge)" };
+        let each = group.iter().map(|p| format!("with resolution {} {}{}", p.resolution, of(p), mark(p)));
         let each = each.collect::<Vec<_>>().join(", ");
         let _ = writeln!(text, "- *{}* (an error of {}) dominates the default: {each}.", better.label(), of(better));
+    }
+    let others: Vec<String> = points.done.iter().filter(|p| p.is_other_front()).map(Point::label).collect();
+    if !others.is_empty() {
+        let _ = writeln!(text, "- On the front of all settings are also of other materials: {}.", others.join("; "));
     }
     text
 }
 
-/// Of the front's points that are not worse in both, the one of the least product of error and cost.
+/// Of the points on the front of the own material that are not worse in both, the one of the least product of error and cost.
 fn best_instead<'a>(points: &'a Points, base: &Point) -> Option<&'a Point> {
-    let better = |p: &&Point| p.rank == Rank::Front && p.cost[0] <= base.cost[0] && p.error[0] <= base.error[0];
+    let better = |p: &&Point| p.is_front() && p.cost[0] <= base.cost[0] && p.error[0] <= base.error[0];
     let product = |p: &Point| p.cost[0] * p.error[0];
     points.done.iter().filter(better).min_by(|a, b| product(a).total_cmp(&product(b)))
 }

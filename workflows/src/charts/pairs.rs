@@ -13,6 +13,8 @@ use std::path::PathBuf;
 const HEAD: &str = "first,second";
 /// So many options are combined, where there are so many.
 const LEAST: usize = 4;
+/// So many pairs of the scene's own material are also run at the lower resolution.
+const BEST: usize = 2;
 
 /// The file of a chart.
 pub fn path(chart: &Chart) -> PathBuf {
@@ -27,21 +29,30 @@ pub fn add_kept(chart: &mut Chart) -> Result<bool, Failure> {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(false),
         Err(e) => return Err(Failure::no_input(format!("{}: {e}", paths::short(&path).display()))),
     };
+    let mut best = 0;
     for (first, second) in text.lines().skip(1).filter_map(|line| line.split_once(',')) {
-        if let Ok(runs) = chart.pair(first, second) {
+        let is_own = ![first, second].iter().any(|option| chart.is_other_material(option));
+        let lower = chart.pairs.lower.filter(|_| is_own && best < BEST);
+        let resolutions: Vec<f64> = lower.into_iter().chain([chart.pairs.resolution]).collect();
+        if let Ok(runs) = chart.pair(first, second, &resolutions) {
             chart.study.runs.extend(runs);
+            best += usize::from(is_own);
         }
     }
     Ok(true)
 }
 
-/// Chooses, keeps the choice, and adds the runs; nothing while single runs are missing.
+/// Chooses, keeps the choice, and adds the runs; nothing while single runs are missing. Those of the scene's own material come first, as if
+/// there were no others, and then those of all settings that are not among them.
 pub fn choose(chart: &mut Chart, results: &Results) -> Result<bool, Failure> {
     let points = points::of(chart, results);
     if points.missing > 0 {
         return Ok(false);
     }
-    let pairs = promising(chart, &points.done);
+    let own: Vec<Point> = points.done.iter().filter(|point| !point.is_other()).cloned().collect();
+    let mut pairs = promising(chart, &own);
+    let others = promising(chart, &points.done).into_iter().filter(|pair| !pairs.contains(pair)).collect::<Vec<_>>();
+    pairs.extend(others);
     let text = pairs.iter().fold(HEAD.to_owned(), |text, [first, second]| format!("{text}\n{first},{second}")) + "\n";
     let path = path(chart);
     disk::write_atomic(&path, text.as_bytes())
@@ -65,7 +76,7 @@ pub fn promising(chart: &Chart, points: &[Point]) -> Vec<[String; 2]> {
         }
     }
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
-    let fits = |pair: &[String; 2]| chart.pair(&pair[0], &pair[1]).is_ok();
+    let fits = |pair: &[String; 2]| chart.pair(&pair[0], &pair[1], &[chart.pairs.resolution]).is_ok();
     pairs.into_iter().map(|(_, pair)| pair).filter(fits).take(chart.pairs.most).collect()
 }
 
@@ -76,7 +87,7 @@ fn candidates(chart: &Chart, mut single: Vec<Point>) -> Vec<Point> {
     let mut found: Vec<Point> = Vec::new();
     while found.len() < LEAST && !single.is_empty() {
         points::rank(&mut single);
-        let (behind, ahead): (Vec<Point>, Vec<Point>) = single.into_iter().partition(|p| p.rank == Rank::Behind);
+        let (behind, ahead): (Vec<Point>, Vec<Point>) = single.into_iter().partition(|p| p.of_all == Rank::Behind);
         found.extend(ahead.into_iter().filter(|point| !is_alone(point)));
         single = behind;
     }

@@ -13,10 +13,14 @@ use crate::study::{
 
 /// Of the inside, pixels.
 const INSIDE: [f64; 2] = [560.0, 400.0];
-/// Room left of it, above it, right of it, and below it.
+/// Room left of it, above it, right of it at least, and below it.
 const MARGIN: [f64; 4] = [80.0, 14.0, 330.0, 56.0];
 /// Of a line of the legend.
 const LINE: f64 = 18.0;
+/// Of a character of the legend, in the mean.
+const CHARACTER: f64 = 7.0;
+/// Of the legend, beside those of the fronts.
+const MORE_LINES: usize = 9;
 /// Of those that are not on the front.
 const PALE: &str = "#c4c4c4";
 /// Half of the side of what a marker takes.
@@ -42,10 +46,14 @@ pub fn png(chart: &Chart, points: &Points) -> Result<Vec<u8>, String> {
 }
 
 fn draw(chart: &Chart, points: &Points) -> Paper {
-    let front: Vec<&Point> = points.done.iter().filter(|point| point.rank == Rank::Front).collect();
-    let told = MARGIN[1] + LINE * (front.len() + 9) as f64 + 10.0;
+    let of = |is: &dyn Fn(&&Point) -> bool| points.done.iter().filter(is).collect::<Vec<&Point>>();
+    let front = of(&|point| point.is_front());
+    let others = of(&|point| point.is_other_front());
+    let told = MARGIN[1] + LINE * (front.len() + others.len() + MORE_LINES) as f64 + 10.0;
     let height = told.max(MARGIN[1] + INSIDE[1] + MARGIN[3]);
-    let mut paper = Paper::new([MARGIN[0] + INSIDE[0] + MARGIN[2], height]);
+    let longest = front.iter().chain(&others).map(|point| point.label().chars().count()).max().unwrap_or(0);
+    let right = MARGIN[2].max(56.0 + CHARACTER * longest as f64);
+    let mut paper = Paper::new([MARGIN[0] + INSIDE[0] + right, height]);
     let x = Axis::new(points.done.iter().map(|p| p.cost[0]), true);
     let reference = chart.error.reference.filter(|r| points.done.iter().any(|p| p.error[0] < 1.5 * r));
     let errors = points.done.iter().flat_map(|p| [p.error[0], p.error[0] + p.error[1]]).chain(reference);
@@ -59,6 +67,11 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
         let [left, at] = place(x.range[0], level);
         paper.line(&[[left, at], [left + INSIDE[0], at]], COLOURS[2], 1.4, "7 4");
     }
+    // Where both fronts are the same, that of the scene's own material hides the other.
+    let of_all = staircase(&of(&|point| point.of_all == Rank::Front), &place, [&x, &y]);
+    if !others.is_empty() {
+        paper.line(&of_all, COLOURS[3], 1.4, "5 3");
+    }
     let stairs = staircase(&front, &place, [&x, &y]);
     paper.line(&stairs, COLOURS[4], 2.2, "");
     let base: Vec<[f64; 2]> =
@@ -66,36 +79,58 @@ fn draw(chart: &Chart, points: &Points) -> Paper {
     paper.line(&base, INK, 1.0, "3 3");
     // Pale ones first, so that those that matter lie above.
     let mut order: Vec<&Point> = points.done.iter().collect();
-    order.sort_by_key(|point| (std::cmp::Reverse(point.rank), point.is_base()));
-    let (mut taken, mut lines): (Vec<Box4>, Vec<Box4>) = (Vec::new(), stairs.windows(2).map(around).collect());
+    order.sort_by_key(|point| (!point.is_behind(), point.is_front(), point.is_base()));
+    let (mut taken, mut lines): (Vec<Box4>, Vec<Box4>) = (Vec::new(), Vec::new());
+    lines.extend(stairs.windows(2).chain(of_all.windows(2)).map(around));
     for point in &order {
         let at = place(point.cost[0], point.error[0]);
         let (shape, colour, _) = look(point);
-        let is_pale = point.rank == Rank::Behind && !point.is_base();
+        let is_pale = point.is_behind() && !point.is_base();
         let ends = [-1.0, 1.0].map(|side| place(point.cost[0], point.error[0] + side * point.error[1]));
-        let width = if point.rank == Rank::Front { 1.6 } else { 0.8 };
+        let width = if point.is_front() { 1.6 } else { 0.8 };
         paper.line(&ends, if is_pale { GRID } else { colour }, width, "");
-        paper.marker(at, shape, if is_pale { PALE } else { colour });
+        let colour = if is_pale { PALE } else { colour };
+        match point.is_other() {
+            true => paper.hollow(at, shape, colour),
+            false => paper.marker(at, shape, colour),
+        }
         if !is_pale {
             lines.push(around(&ends));
         }
         taken.push([at[0] - HALF, at[1] - HALF, at[0] + HALF, at[1] + HALF]);
     }
     let labels = front.iter().enumerate().map(|(k, point)| ((k + 1).to_string(), *point));
-    let sizes = points.done.iter().filter(|p| p.is_base() && p.rank != Rank::Front);
-    let all = labels.chain(sizes.map(|point| (format!("d{}", point.resolution), point)));
+    let letters = others.iter().enumerate().map(|(k, point)| (letter(k), *point));
+    let sizes = points.done.iter().filter(|p| p.is_base() && !p.is_front());
+    let all = labels.chain(letters).chain(sizes.map(|point| (format!("d{}", point.resolution), point)));
     for (text, point) in all {
         let at = place(point.cost[0], point.error[0]);
         // Best where no line is either.
         let clear = [&taken[..], &lines].concat();
         if let Some(corner) = free(&text, at, &clear).or_else(|| free(&text, at, &taken)) {
             let middle = [0.5 * (corner[0] + corner[2]), 0.5 * (corner[1] + corner[3])];
+            if let Some(line) = leader(at, &corner) {
+                paper.line(&line, INK, 0.6, "");
+            }
             paper.text(&text, middle, Anchor::Middle);
             taken.push(corner);
         }
     }
-    legend(&mut paper, &front, reference.is_some());
+    legend(&mut paper, &front, &others, reference.is_some());
     paper
+}
+
+/// From a marker to its label, where that had to go farther away than the next one might be.
+fn leader(at: [f64; 2], label: &Box4) -> Option<[[f64; 2]; 2]> {
+    let nearest = [at[0].clamp(label[0], label[2]), at[1].clamp(label[1], label[3])];
+    let far = (nearest[0] - at[0]).hypot(nearest[1] - at[1]);
+    (far > 1.5 * HALF).then_some([at, nearest])
+}
+
+/// `a`, `b` and so on; after `z` comes `a2`.
+fn letter(k: usize) -> String {
+    let letter = char::from(b'a' + (k % 26) as u8);
+    if k < 26 { letter.to_string() } else { format!("{letter}{}", k / 26 + 1) }
 }
 
 fn frame(paper: &mut Paper, chart: &Chart, [x, y]: [&Axis; 2]) {
@@ -142,7 +177,7 @@ fn free(text: &str, [x, y]: [f64; 2], taken: &[Box4]) -> Option<Box4> {
     let inside =
         |b: &Box4| b[0] > MARGIN[0] && b[1] > MARGIN[1] && b[2] < MARGIN[0] + INSIDE[0] && b[3] < MARGIN[1] + INSIDE[1];
     let apart = |a: &Box4, b: &Box4| a[2] <= b[0] || b[2] <= a[0] || a[3] <= b[1] || b[3] <= a[1];
-    [0.0, 6.0, 14.0].into_iter().find_map(|gap| {
+    [0.0, 6.0, 14.0, 24.0, 36.0].into_iter().find_map(|gap| {
         let (dx, dy) = (HALF + gap + 0.5 * width, HALF + gap + 0.5 * height);
         let sides = [[-dx, dy], [dx, -dy], [-dx, -dy], [dx, dy], [-dx, 0.0], [dx, 0.0], [0.0, dy], [0.0, -dy]];
         let boxes = sides.map(|[a, b]| {
@@ -153,7 +188,7 @@ fn free(text: &str, [x, y]: [f64; 2], taken: &[Box4]) -> Option<Box4> {
     })
 }
 
-fn legend(paper: &mut Paper, front: &[&Point], reference: bool) {
+fn legend(paper: &mut Paper, front: &[&Point], others: &[&Point], reference: bool) {
     let left = MARGIN[0] + INSIDE[0] + 14.0;
     let mut at = MARGIN[1] + 8.0 - LINE;
     let mut next = || {
@@ -169,15 +204,28 @@ fn legend(paper: &mut Paper, front: &[&Point], reference: bool) {
     paper.marker([left + 10.0, y], 0, PALE);
     paper.text("dominated beyond the scatter", [left + 26.0, y], Anchor::Start);
     let y = next();
+    paper.hollow([left + 10.0, y], 0, INK);
+    paper.text("hollow: of another material", [left + 26.0, y], Anchor::Start);
+    let y = next();
     paper.line(&[[left, y], [left + 20.0, y]], COLOURS[4], 2.2, "");
-    paper.text("front:", [left + 26.0, y], Anchor::Start);
-    for (k, point) in front.iter().enumerate() {
-        let y = next();
-        paper.text(&format!("{}", k + 1), [left + 20.0, y], Anchor::End);
+    paper.text("front of the scene's own material:", [left + 26.0, y], Anchor::Start);
+    let entry = |paper: &mut Paper, y: f64, name: &str, point: &Point| {
+        paper.text(name, [left + 20.0, y], Anchor::End);
         let mark = if point.level { "~ " } else { "" };
         paper.text(&format!("{mark}{}", point.label()), [left + 26.0, y], Anchor::Start);
+    };
+    for (k, point) in front.iter().enumerate() {
+        entry(paper, next(), &(k + 1).to_string(), point);
     }
-    if front.iter().any(|point| point.level) {
+    if !others.is_empty() {
+        let y = next();
+        paper.line(&[[left, y], [left + 20.0, y]], COLOURS[3], 1.4, "5 3");
+        paper.text("and with other materials:", [left + 26.0, y], Anchor::Start);
+    }
+    for (k, point) in others.iter().enumerate() {
+        entry(paper, next(), &letter(k), point);
+    }
+    if front.iter().chain(others).any(|point| point.level) {
         paper.text("~ within the scatter of a cheaper one", [left + 26.0, next()], Anchor::Start);
     }
     if reference {
@@ -199,6 +247,11 @@ mod tests {
         assert!(first[2] <= marker[0] && first[1] >= marker[3], "{first:?}");
         let second = free("12", at, &[marker, first]).unwrap();
         assert_ne!(first, second);
+        // The second one is beside the marker still; where only a farther place is free, a line leads there.
+        assert!(leader(at, &first).is_none() && leader(at, &second).is_none());
+        let far = free("12", at, &[[274.0, 174.0, 326.0, 214.0]]).unwrap();
+        assert!(far[1] > 214.0 && leader(at, &far).is_some(), "{far:?}");
+        assert_eq!(leader(at, &[320.0, 190.0, 330.0, 210.0]), Some([at, [320.0, 200.0]]));
         let crowd: Vec<Box4> = vec![[0.0, 0.0, 1000.0, 1000.0]];
         assert_eq!(free("12", at, &crowd), None);
     }

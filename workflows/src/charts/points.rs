@@ -39,9 +39,11 @@ pub struct Point {
     pub particle_steps: f64,
     /// Particles.
     pub particles: u64,
-    /// On the front?
-    pub rank: Rank,
-    /// On the front, and better than a cheaper point of it by no more than the scatter?
+    /// Among the settings of the scene's own material; none for one of another material.
+    pub rank: Option<Rank>,
+    /// Among all settings.
+    pub of_all: Rank,
+    /// On the front, and better than a cheaper point of it by no more than the scatter? On that of all for another material.
     pub level: bool,
     /// Has the scene of a run changed since?
     pub stale: bool,
@@ -75,9 +77,33 @@ impl Point {
         self.series == PAIRS
     }
 
+    /// Is it of another material than the scene?
+    pub fn is_other(&self) -> bool {
+        self.rank.is_none()
+    }
+
+    /// On the front of the scene's own material?
+    pub fn is_front(&self) -> bool {
+        self.rank == Some(Rank::Front)
+    }
+
+    /// Of another material, and on the front of all settings?
+    pub fn is_other_front(&self) -> bool {
+        self.is_other() && self.of_all == Rank::Front
+    }
+
+    /// Does it count for nothing: dominated among its own, or of another material and dominated among all?
+    pub fn is_behind(&self) -> bool {
+        self.rank.unwrap_or(self.of_all) == Rank::Behind
+    }
+
     /// For tables.
-    pub fn word(&self) -> &'static str {
-        if self.level { "front, ~ a cheaper one" } else { self.rank.word() }
+    pub fn word(&self) -> String {
+        let rank = |rank: Rank| if self.level { "front, ~ a cheaper one" } else { rank.word() };
+        match self.rank {
+            Some(own) => rank(own).to_owned(),
+            None => format!("other material; of all: {}", rank(self.of_all)),
+        }
     }
 
     fn place(&self) -> Place {
@@ -85,7 +111,7 @@ impl Point {
     }
 }
 
-/// The points, with their ranks among all of them.
+/// The points, with their ranks.
 pub fn of(chart: &Chart, results: &Results) -> Points {
     let mut points = Points::default();
     for runs in chart.study.runs.chunk_by(|a, b| setting(a) == setting(b)) {
@@ -105,6 +131,7 @@ pub fn of(chart: &Chart, results: &Results) -> Points {
             continue;
         }
         let cost = mean_and_deviation(&costs);
+        let is_other = chart.is_other_material(&name);
         points.done.push(Point {
             setting: name,
             series: runs[0].series.clone(),
@@ -115,7 +142,8 @@ pub fn of(chart: &Chart, results: &Results) -> Points {
             also: chart.also.iter().map(|column| mean_and_deviation(&of(&column.expression))[0]).collect(),
             particle_steps: mean_and_deviation(&of(numbers::PARTICLE_STEPS))[0],
             particles: lines.iter().filter_map(|(_, line)| line.particles).max().unwrap_or(0),
-            rank: Rank::Behind,
+            rank: (!is_other).then_some(Rank::Behind),
+            of_all: Rank::Behind,
             level: false,
             stale: lines.iter().any(|(run, line)| line.scene != results::hash(run)),
         });
@@ -126,13 +154,23 @@ pub fn of(chart: &Chart, results: &Results) -> Points {
     points
 }
 
-/// Ranks among these points alone.
+/// Ranks among these points alone: among all of them, and among those of the scene's own material.
 pub fn rank(points: &mut [Point]) {
-    let places: Vec<Place> = points.iter().map(Point::place).collect();
-    let ranks = front::ranks(&places);
-    let levels = front::levels(&places, &ranks);
-    for (point, (rank, level)) in points.iter_mut().zip(ranks.into_iter().zip(levels)) {
-        (point.rank, point.level) = (rank, level);
+    let found = |points: &[&mut Point]| {
+        let places: Vec<Place> = points.iter().map(|point| point.place()).collect();
+        let ranks = front::ranks(&places);
+        let levels = front::levels(&places, &ranks);
+        ranks.into_iter().zip(levels)
+    };
+    let mut all: Vec<&mut Point> = points.iter_mut().collect();
+    let ranks = found(&all);
+    for (point, (rank, level)) in all.iter_mut().zip(ranks) {
+        (point.of_all, point.level) = (rank, level);
+    }
+    all.retain(|point| !point.is_other());
+    let ranks = found(&all);
+    for (point, (rank, level)) in all.iter_mut().zip(ranks) {
+        (point.rank, point.level) = (Some(rank), level);
     }
 }
 
@@ -178,7 +216,8 @@ mod tests {
             also: Vec::new(),
             particle_steps: 1e6,
             particles: 100,
-            rank: Rank::Behind,
+            rank: Some(Rank::Behind),
+            of_all: Rank::Behind,
             level: false,
             stale: false,
         }

@@ -1,13 +1,14 @@
 //! The charts that come along, and small ones made up here.
 
 use super::{
-    definition::{self, Chart, PAIRS},
+    definition::{self, BASE, Chart, PAIRS},
     front::Rank,
     netcdf, page, pairs, picture, points,
 };
 use crate::{
     paths,
     study::{
+        definition::Run,
         page::markers,
         results::{self, Line, Results},
         template,
@@ -125,7 +126,26 @@ fn every_run_of_every_chart_is_a_valid_scene() {
         // Reading has checked the scenes; what stays is that resolution and lattice have arrived.
         let chart = Chart::named(&name).unwrap_or_else(|e| panic!("{e}"));
         let settings = points::of(&chart, &Results::default()).missing;
-        assert!(settings >= 25, "{name}: {settings} settings");
+        assert!(settings >= 45, "{name}: {settings} settings");
+        // Every option has at least two resolutions, one of them that of the pairs or all of its own.
+        for option in chart.choices.iter().flat_map(|choice| &choice.options) {
+            let of_it = |run: &&Run| run.parameters[0].1.to_string() == option.name;
+            let mut found: Vec<f64> = chart
+                .study
+                .runs
+                .iter()
+                .filter(of_it)
+                .filter_map(|r| template::number(&r.parameters, "resolution"))
+                .collect();
+            found.dedup();
+            assert!(found.len() >= 2, "{name}, {}: {found:?}", option.name);
+            assert!(option.alone || found.contains(&chart.pairs.resolution), "{name}, {}: {found:?}", option.name);
+        }
+        let lower = chart.pairs.lower.unwrap();
+        let base: Vec<&Run> = chart.study.runs.iter().filter(|run| run.series == BASE).collect();
+        let has_base =
+            |resolution: f64| base.iter().any(|r| template::number(&r.parameters, "resolution") == Some(resolution));
+        assert!(lower < chart.pairs.resolution && has_base(lower) && has_base(chart.pairs.resolution), "{name}");
         for run in &chart.study.runs {
             let scene = Scene::read(&run.name, &run.scene).unwrap();
             let number = |key: &str| template::number(&run.parameters, key).unwrap();
@@ -133,6 +153,29 @@ fn every_run_of_every_chart_is_a_valid_scene() {
             let ratio = scene.spacing * number("resolution");
             assert!([0.1, 0.02].iter().any(|length| (ratio / length - 1.0).abs() < 1e-9), "{}: {ratio}", run.name);
         }
+    }
+}
+
+/// A choice that touches what the scene's author says about the material must be marked, and no other. Sound speed, mean stress, cap, and
+/// what carries stress below yield are numbers of the method; see tests/charts/README.md.
+#[test]
+fn options_of_another_material_are_marked() {
+    let physical = ["young", "poisson", "friction", "cohesion", "dilatancy", "cone", "curve", "tension", "density"];
+    for name in definition::names().unwrap() {
+        let chart = Chart::named(&name).unwrap();
+        for choice in &chart.choices {
+            for option in &choice.options {
+                let laws = option.set.get("material").and_then(toml::Value::as_table);
+                let keys = laws.into_iter().flatten().filter_map(|(_, law)| law.as_table()).flat_map(|law| law.keys());
+                let mut files = option.instead.keys();
+                let is_physical = keys.into_iter().any(|key| physical.contains(&key.as_str()))
+                    || files.any(|file| file.contains("materials/"));
+                assert_eq!(choice.material, is_physical, "{name}: {}", option.name);
+                assert_eq!(chart.is_other_material(&option.name), is_physical, "{name}: {}", option.name);
+            }
+        }
+        assert!(chart.choices.iter().any(|choice| choice.material), "{name}");
+        assert!(!chart.is_other_material(BASE), "{name}");
     }
 }
 
@@ -252,6 +295,78 @@ fn pairs_are_the_promising_ones_and_chosen_once() {
     assert_eq!(of_pairs(&without), names[1..]);
 }
 
+/// The same with `law` and `stiffness` as other materials, and pairs at a resolution below.
+fn with_materials(folder: &Path) -> Chart {
+    let text = ["law", "stiffness"].iter().fold(CHART.replace("most = 2", "most = 2\nlower = 5"), |text, name| {
+        text.replace(&format!("name = \"{name}\"\n"), &format!("name = \"{name}\"\nmaterial = true\n"))
+    });
+    made_up(folder, &text).unwrap()
+}
+
+#[test]
+fn the_front_of_the_own_material_knows_no_other() {
+    let work = tempfile::tempdir().unwrap();
+    let chart = with_materials(work.path());
+    let points = points::of(&chart, &with(&chart, &SINGLE));
+    let place = |label: &str| {
+        let point = points.done.iter().find(|point| point.label() == label).unwrap();
+        (point.rank, point.of_all)
+    };
+    // `soft` is the cheapest, `fluid` more accurate than what is cheaper: both on the front of all, neither on that of the own.
+    assert_eq!(place("soft, 10"), (None, Rank::Front));
+    assert_eq!(place("fluid, 10"), (None, Rank::Front));
+    assert_eq!(place("default, 10"), (Some(Rank::Front), Rank::Front));
+    assert_eq!(place("default, 20"), (Some(Rank::Behind), Rank::Behind));
+    // A setting that only another material beats: behind among all, on the front of its own.
+    let mut better = SINGLE;
+    better[4] = ("law-fluid", 2.08, 0.9);
+    let points = points::of(&chart, &with(&chart, &better));
+    let default = points.done.iter().find(|point| point.label() == "default, 10").unwrap();
+    assert_eq!((default.rank, default.of_all), (Some(Rank::Front), Rank::Behind));
+    let part = page::part(&chart, &with(&chart, &better), &points);
+    for line in [
+        "- The default is on the front with resolution 10.",
+        "- On the front of all settings are also of other materials: soft, 10; fluid, 10.",
+        "| fluid | law | 10 | 100 | 2 | 0.0400 ± 0 | 2.08 | 0.900 | 1.00 | other material; of all: **front** |",
+    ] {
+        assert!(part.lines().any(|l| l == line), "no {line}\n{part}");
+    }
+    assert!(!part.contains("*fluid, 10*"), "the default is judged against its own material\n{part}");
+    assert!(picture::png(&chart, &points).unwrap().len() > 1000);
+    let path = work.path().join("chart.nc");
+    netcdf::dataset(&chart, &points).write(&path).unwrap();
+    let of = |name: &str| formats::results::read(&path, name).unwrap();
+    // By cost: soft, fluid, default, wide, wendland, short, default at 20.
+    assert_eq!(of("other_material"), [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(of("on_front"), [0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0]);
+    assert_eq!(of("on_front_of_all"), [1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+}
+
+#[test]
+fn pairs_of_the_own_material_come_first_and_the_best_also_below() {
+    let work = tempfile::tempdir().unwrap();
+    let mut chart = with_materials(work.path());
+    let results = with(&chart, &SINGLE);
+    assert!(pairs::choose(&mut chart, &results).unwrap());
+    let text = std::fs::read_to_string(pairs::path(&chart)).unwrap();
+    // Of the own material there are `short`, `wide`, and behind their front `wendland`, which excludes `wide`.
+    assert_eq!(text, "first,second\nshort,wide\nshort,wendland\nshort,soft\n");
+    let names = |chart: &Chart| -> Vec<String> {
+        chart.study.runs.iter().filter(|run| run.series == PAIRS).map(|run| run.name.clone()).collect()
+    };
+    let expected = [
+        "pairs-short-and-wide-resolution-5-seed-1",
+        "pairs-short-and-wide-resolution-10-seed-1",
+        "pairs-short-and-wendland-resolution-5-seed-1",
+        "pairs-short-and-wendland-resolution-10-seed-1",
+        "pairs-short-and-soft-resolution-10-seed-1",
+    ];
+    assert_eq!(names(&chart), expected);
+    let with_soft = points::of(&chart, &with(&chart, &[("pairs", 2.01, 1.0)]));
+    let pair = with_soft.done.iter().find(|point| point.setting == "short and soft").unwrap();
+    assert!(pair.is_other() && with_soft.done.iter().filter(|point| point.is_other()).count() == 1);
+}
+
 #[test]
 fn settings_count_once_all_their_lattices_are_there() {
     let work = tempfile::tempdir().unwrap();
@@ -262,7 +377,7 @@ fn settings_count_once_all_their_lattices_are_there() {
     let points = points::of(&chart, &results);
     assert_eq!((points.done.len(), points.missing), (5, 1));
     assert_eq!(points.failed, ["fluid, 10 (1 of 2)"]);
-    let rank = |label: &str| points.done.iter().find(|point| point.label() == label).unwrap().rank;
+    let rank = |label: &str| points.done.iter().find(|point| point.label() == label).unwrap().rank.unwrap();
     assert_eq!([rank("soft, 10"), rank("default, 10"), rank("short, 10")], [Rank::Front; 3]);
     assert_eq!([rank("wendland, 10"), rank("default, 20")], [Rank::Behind; 2]);
 }

@@ -55,10 +55,19 @@ impl Paper {
     }
 
     /// A marker; shapes differ, for those who cannot tell the colours.
-    pub fn marker(&mut self, [x, y]: [f64; 2], shape: usize, colour: &str) {
+    pub fn marker(&mut self, at: [f64; 2], shape: usize, colour: &str) {
+        self.shape(at, shape, &format!("fill=\"{colour}\""));
+    }
+
+    /// The same, white inside.
+    pub fn hollow(&mut self, at: [f64; 2], shape: usize, colour: &str) {
+        self.shape(at, shape, &format!("fill=\"white\" stroke=\"{colour}\" stroke-width=\"1.6\""));
+    }
+
+    fn shape(&mut self, [x, y]: [f64; 2], shape: usize, look: &str) {
         let corners: &[[f64; 2]] = match shape % 5 {
             0 => {
-                let _ = writeln!(self.body, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{colour}\"/>");
+                let _ = writeln!(self.body, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" {look}/>");
                 return;
             }
             1 => &[[-3.6, -3.6], [3.6, -3.6], [3.6, 3.6], [-3.6, 3.6]],
@@ -67,7 +76,7 @@ impl Paper {
             _ => &[[0.0, 5.0], [4.6, -3.4], [-4.6, -3.4]],
         };
         let list: Vec<String> = corners.iter().map(|[a, b]| format!("{:.1},{:.1}", x + a, y + b)).collect();
-        let _ = writeln!(self.body, "<polygon points=\"{}\" fill=\"{colour}\"/>", list.join(" "));
+        let _ = writeln!(self.body, "<polygon points=\"{}\" {look}/>", list.join(" "));
     }
 
     /// Text at a place, its middle at that height.
