@@ -90,7 +90,11 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
 fn meet(time: f64, dt: f64, event: f64) -> (f64, f64) {
     let left = event - time;
     let steps = (left / dt * (1.0 - 1e-9)).ceil();
-    if steps <= 1.0 { (left, event) } else { (left / steps, time + left / steps) }
+    if steps <= 1.0 {
+        return (left, event);
+    }
+    let step = if left.is_finite() { left / steps } else { dt };
+    (step, time + step)
 }
 
 #[cfg(test)]
@@ -108,6 +112,7 @@ mod tests {
             }
             assert_eq!((time, steps), (1.0, count), "{dt}");
         }
+        assert_eq!(meet(0.25, 0.1, f64::INFINITY), (0.1, 0.35));
         // What is left decides anew at each step, so a limit that falls shortens the next one.
         assert_eq!(meet(0.25, 0.1, 1.0), (0.09375, 0.34375));
     }
