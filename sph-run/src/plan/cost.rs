@@ -47,8 +47,8 @@ impl Costs {
     /// The defaults: measured on one core with AVX-512 (see docs/scaling.md).
     pub fn of_space(space: Space) -> Self {
         let microseconds = match space {
-            Space::PlaneStrain | Space::Axisymmetric => 0.5,
-            Space::ThreeD => 1.1,
+            Space::PlaneStrain | Space::Axisymmetric => 0.2,
+            Space::ThreeD => 0.7,
         };
         Self { particle: 1e-6 * microseconds, origin: format!("default of {}", space.name()) }
     }
