@@ -5,18 +5,21 @@ use crate::parallel::comm::Reduce;
 use crate::physics::Physics;
 use crate::simulation::Simulation;
 use crate::space::Space;
-use formats::scene::{Obstacle, Scene};
+use formats::scene::Scene;
 
 /// Names and units of their columns in the history, after those of [`crate::report::columns`].
 pub fn columns(scene: &Scene) -> Vec<String> {
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let named = |(n, obstacle): (usize, &Obstacle)| {
-        let name = obstacle.name.replace('-', "_");
-        // Those of other letters go by their number, from 1.
-        let name = if name.chars().all(plain) { name } else { format!("{}", n + 1) };
-        ["x", "y", "z"].map(|axis| format!("force_{name}_{axis} [N]"))
+    let names = plain(scene.obstacles.iter().map(|obstacle| obstacle.name.as_str()));
+    names.iter().flat_map(|name| ["x", "y", "z"].map(|axis| format!("force_{name}_{axis} [N]"))).collect()
+}
+
+/// Names with letters that every reader of tables takes; those that have others, or would be the same, go by their number, from 1.
+fn plain<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let names: Vec<String> = names.map(|name| name.replace('-', "_")).collect();
+    let fits = |name: &String| {
+        name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') && names.iter().filter(|n| *n == name).count() == 1
     };
-    scene.obstacles.iter().enumerate().flat_map(named).collect()
+    names.iter().enumerate().map(|(n, name)| if fits(name) { name.clone() } else { (n + 1).to_string() }).collect()
 }
 
 impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
@@ -58,5 +61,17 @@ impl<const D: usize, const N: usize, P: Physics<D, N>> Simulation<'_, D, N, P> {
         self.neighbors.refresh::<N, P::Kernel>(&self.particles, parameters.pairs);
         exact::reduce(self.comm, &mut sums);
         sums.chunks_exact(3).map(|force| [0, 1, 2].map(|axis| force[axis].value())).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plain;
+
+    #[test]
+    fn every_obstacle_has_columns_of_its_own() {
+        let names = |names: &[&str]| plain(names.iter().copied());
+        assert_eq!(names(&["wall", "house-1", "höhle"]), ["wall", "house_1", "3"]);
+        assert_eq!(names(&["a-b", "a_b", "c"]), ["1", "2", "c"]);
     }
 }

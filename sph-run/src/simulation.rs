@@ -164,7 +164,7 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
             clock,
             particles,
             neighbors: Neighbors::default(),
-            partition: Partition { tree, halo: Halo::default(), balance: Balance::default() },
+            partition: Partition { tree, halo: Halo::default(), balance: Balance::from_step(clock.step) },
             periods,
             mirrors: Mirrors::new::<P::Space>(scene),
             walls: Walls::new(WallLattice::new(scene), dx.powi(D as i32)),
@@ -192,8 +192,10 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         self.periods.wrap(&mut self.particles.x[..self.particles.owned]);
         let (step, computed) = (self.clock.step, self.watch.computed());
         let partition = &mut self.partition;
-        let off = partition.balance.is_off(self.parameters.count, step, computed, self.comm);
-        if off || self.always_rebalance {
+        let is_shared = self.comm.size() > 1;
+        if is_shared
+            && (partition.balance.is_off(self.parameters.count, step, computed, self.comm) || self.always_rebalance)
+        {
             let weights: Vec<u64> = partition.balance.weights().collect();
             let axes: Vec<usize> = (0..3).filter(|&a| P::Space::axis(a).is_some()).collect();
             let places = self.particles.x[..self.particles.owned].iter().map(|&x| P::Space::to_disk(x));
@@ -229,8 +231,10 @@ impl<'a, const D: usize, const N: usize, P: Physics<D, N>> Simulation<'a, D, N, 
         self.mirrors.fill(&mut self.particles, Fields::Motion);
         self.walls.create::<D, N, P::Space>(&mut self.particles, reach);
         self.neighbors.build(&self.particles, reach, self.parameters.pairs);
-        let lists = &self.neighbors.of_owned;
-        self.partition.balance.settled((0..lists.len()).map(|i| lists.of(i).len()));
+        if self.comm.size() > 1 {
+            let lists = &self.neighbors.of_owned;
+            self.partition.balance.settled((0..lists.len()).map(|i| lists.of(i).len()));
+        }
         self.reflect_motion(0);
     }
 

@@ -1,15 +1,14 @@
 //! What ranks share evenly: work. The test starts itself again under mpirun.
 
-use crate::support::under_mpi;
+use crate::support::{in_turn, under_mpi};
 use formats::h5::Communicator;
 use formats::scene::{Material as Law, Scene};
 use sph_run::material::DruckerPrager;
 use sph_run::parallel::Reduce;
 use sph_run::parallel::balance::{BESIDE_PAIRS, By};
-use sph_run::particles::{Particles, key};
 use sph_run::physics::{CubicSpline, Model};
 use sph_run::simulation::{Clock, Simulation};
-use sph_run::space::{PlaneStrain, Space};
+use sph_run::space::PlaneStrain;
 
 const DX: f64 = 0.01;
 const SCENE: &str = r#"
@@ -39,18 +38,8 @@ fn run<'a>(
     comm: &'a Communicator,
     scene: &Scene,
 ) -> Simulation<'a, 2, 4, Model<PlaneStrain, CubicSpline, DruckerPrager>> {
-    let mut mine = Particles::<2, 4>::default();
     let all = places();
-    for (n, &x) in all.iter().enumerate().skip(Reduce::rank(comm)).step_by(Reduce::size(comm)) {
-        mine.key.push(key(n as u64, 0));
-        mine.x.push(PlaneStrain::from_disk(x));
-        mine.mass.push(0.26);
-        mine.density.push(2600.0);
-    }
-    let count = mine.key.len();
-    (mine.a, mine.history) = (vec![Default::default(); count], vec![Default::default(); count]);
-    (mine.work, mine.body) = (vec![Default::default(); count], vec![0; count]);
-    mine.own(count);
+    let mine = in_turn::<2, 4, PlaneStrain>(comm, &all, 0.26);
     let Law::DruckerPrager(law) = &scene.material else { panic!("the law of the scene") };
     Simulation::new(comm, scene, DruckerPrager::new(law), mine, all.len() as u64, Clock::default())
 }

@@ -1,11 +1,10 @@
 //! Plans against runs: what is counted for all ranks on one is what each of several finds. The test starts itself again
 //! under mpirun.
 
-use crate::support::under_mpi;
+use crate::support::{in_turn, under_mpi};
 use formats::scene::{Material as Law, Scene};
 use sph_run::material::DruckerPrager;
 use sph_run::parallel::Reduce;
-use sph_run::particles::{Particles, key};
 use sph_run::physics::{CubicSpline, Model};
 use sph_run::plan::partition::{Load, Partition};
 use sph_run::plan::places::{State, points};
@@ -66,17 +65,7 @@ fn compare<const D: usize, const N: usize, S: Space<D, N>>(
     let (rank, size, points) = (Reduce::rank(comm), Reduce::size(comm), points(scene, state));
     let planned = Partition::of(scene, &points, size);
     assert_eq!(planned.faults, [""; 0], "{state:?}");
-    let mut mine = Particles::<D, N>::default();
-    for (n, &x) in points.iter().enumerate().skip(rank).step_by(size) {
-        mine.key.push(key(n as u64, 0));
-        mine.x.push(S::from_disk(x));
-        mine.mass.push(1.0);
-        mine.density.push(2600.0);
-    }
-    let count = mine.key.len();
-    (mine.a, mine.history) = (vec![Default::default(); count], vec![Default::default(); count]);
-    (mine.work, mine.body) = (vec![Default::default(); count], vec![0; count]);
-    mine.own(count);
+    let mine = in_turn::<D, N, S>(comm, &points, 1.0);
     let Law::DruckerPrager(law) = &scene.material else { panic!("the law of these scenes") };
     let (law, all) = (DruckerPrager::new(law), points.len() as u64);
     let simulation =

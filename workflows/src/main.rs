@@ -10,6 +10,7 @@ mod gate;
 mod launch;
 mod paths;
 mod scaling;
+mod shelf;
 mod stability;
 mod stage;
 mod status;

@@ -71,6 +71,11 @@ struct Window {
 }
 
 impl Balance {
+    /// Of a launch that begins with this step.
+    pub fn from_step(step: u64) -> Self {
+        Self { window: Window { begun: step, counted: step, ..Window::default() }, ..Self::default() }
+    }
+
     /// Particles have gone home, and each of this rank's has a list of so many candidates.
     pub fn settled(&mut self, candidates: impl Iterator<Item = usize>) {
         self.work.clear();
@@ -79,11 +84,8 @@ impl Balance {
     }
 
     /// Says, before the next build, whether space is to be cut anew. `count`: number of all particles; `computed`: processor time
-    /// of this rank so far, without waiting. Collective.
+    /// of this rank so far, without waiting. Collective; one rank alone has no use for it.
     pub fn is_off(&mut self, count: u64, step: u64, computed: Duration, comm: &impl Reduce) -> bool {
-        if comm.size() == 1 {
-            return false;
-        }
         self.measure(count, step, computed, comm);
         let off = match self.by {
             By::Work => self.patience.ends(largest_over_mean(self.weights().sum(), comm)),
@@ -239,6 +241,20 @@ mod tests {
         balance.is_off(6, 100, us(144), &Beside(54_000));
         assert_eq!(balance.measured(), Some(1.0));
         assert_eq!(balance.weights().nth(1), Some((16.0_f64 * 120.0 * 4.4) as u64));
+    }
+
+    /// Steps of earlier launches took no time in this one.
+    #[test]
+    fn a_launch_that_goes_on_measures_its_own_steps() {
+        let measured = |first: u64| {
+            let mut balance = Balance::from_step(first);
+            balance.settled([0, 60, 120].into_iter());
+            balance.is_off(6, first + 49, Duration::from_micros(89), &Beside(30_000));
+            assert!(balance.measured().is_none());
+            balance.is_off(6, first + 50, Duration::from_micros(90), &Beside(30_000));
+            balance.weights().collect::<Vec<_>>()
+        };
+        assert_eq!(measured(0), measured(1_000_000));
     }
 
     #[test]

@@ -115,6 +115,25 @@ pub fn close(got: f64, want: f64, tolerance: f64) {
     assert!(error <= tolerance, "got {got:e}, want {want:e}: error {error:e} above {tolerance:e}");
 }
 
+/// Every so many-th of these points, as this rank's resting particles of 2600 kg/m3.
+pub fn in_turn<const D: usize, const N: usize, S: Space<D, N>>(
+    comm: &Communicator,
+    points: &[[f64; 3]],
+    mass: f64,
+) -> Particles<D, N> {
+    let mut mine = Particles::default();
+    for (n, &x) in points.iter().enumerate().skip(Reduce::rank(comm)).step_by(Reduce::size(comm)) {
+        mine.key.push(key(n as u64, 0));
+        mine.x.push(S::from_disk(x));
+    }
+    let count = mine.key.len();
+    (mine.mass, mine.density) = (vec![mass; count], vec![2600.0; count]);
+    (mine.a, mine.history) = (vec![Default::default(); count], vec![Default::default(); count]);
+    (mine.work, mine.body) = (vec![Default::default(); count], vec![0; count]);
+    mine.own(count);
+    mine
+}
+
 /// Runs the test of this name again under mpirun, on each of these numbers of ranks. `None` when that is done; under mpirun MPI,
 /// where a rank that fails ends all of them.
 #[track_caller]

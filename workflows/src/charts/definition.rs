@@ -4,6 +4,7 @@
 use crate::{
     failure::Failure,
     paths,
+    shelf::{self, Shelf},
     study::{
         definition::{Named, Run, Study, value},
         expression,
@@ -169,35 +170,21 @@ fn one() -> f64 {
     1.0
 }
 
-/// Names of the folders with a chart, sorted.
-pub fn names() -> Result<Vec<String>, Failure> {
-    let folder = paths::charts();
-    let entries = std::fs::read_dir(&folder)
-        .map_err(|e| Failure::no_input(format!("{}: cannot list the charts: {e}", folder.display())))?;
-    let has_chart = |entry: &std::fs::DirEntry| entry.path().join("chart.toml").is_file();
-    let mut names: Vec<String> =
-        entries.flatten().filter(has_chart).map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    Ok(names)
+/// All charts.
+pub fn shelf() -> Shelf {
+    Shelf { folder: paths::charts(), file: "chart.toml", kind: "chart" }
 }
 
 impl Chart {
     /// Reads the chart of a name.
     pub fn named(name: &str) -> Result<Self, Failure> {
-        let known = names()?;
-        match known.iter().any(|k| k == name) {
-            true => Self::read(name, &paths::charts().join(name)),
-            false => Err(Failure::usage(format!("there is no chart `{name}`; there are: {}", known.join(", ")))),
-        }
+        Self::read(name, &shelf().find(name)?)
     }
 
     /// Reads the chart in a folder; every scene and expression in it is checked.
     pub fn read(name: &str, folder: &Path) -> Result<Self, Failure> {
-        let path = folder.join("chart.toml");
-        let fault = |e: String| Failure::no_input(format!("{}: {e}", paths::short(&path).display()));
-        let text = std::fs::read_to_string(&path).map_err(|e| fault(e.to_string()))?;
-        let raw: Raw = toml::from_str(&text).map_err(|e| fault(e.to_string()))?;
-        Self::checked(name, folder, raw).map_err(fault)
+        let path = folder.join(shelf().file);
+        Self::checked(name, folder, shelf::parsed(&path)?).map_err(|e| shelf::fault(&path, &e))
     }
 
     fn checked(name: &str, folder: &Path, raw: Raw) -> Result<Self, String> {
@@ -225,6 +212,7 @@ impl Chart {
                 folder: folder.to_owned(),
                 words: format!("chart {name}"),
                 place: paths::chart_runs(name),
+                may_break_down: true,
                 title: raw.title,
                 series,
                 parameters: ["setting", "resolution", "seed"].map(str::to_owned).to_vec(),

@@ -19,13 +19,13 @@ use crate::{
     study::{self, Options, batch, numbers, results::Results},
 };
 use definition::{Chart, PAIRS};
-use formats::{disk, exit};
+use formats::disk;
 use std::path::PathBuf;
 use std::time::Duration;
 
 /// Prints the charts, and how much of each is done.
 pub fn list() -> Result<(), Failure> {
-    for name in definition::names()? {
+    for name in definition::shelf().names()? {
         let mut chart = Chart::named(&name)?;
         let has_pairs = pairs::add_kept(&mut chart)?;
         let results = Results::read(&chart.study)?;
@@ -40,10 +40,7 @@ pub fn list() -> Result<(), Failure> {
 /// Runs what is not there yet, single options first, then pairs of the promising ones; then refreshes table, picture and file.
 pub fn carry_out(name: &str, options: &Options) -> Result<(), Failure> {
     let mut chart = Chart::named(name)?;
-    if let Some(unknown) = options.only.iter().find(|name| !chart.study.series.contains(name)) {
-        let known = chart.study.series.join(", ");
-        return Err(Failure::usage(format!("chart {name} has no series `{unknown}`; it has: {known}")));
-    }
+    chart.study.check_series(&options.only)?;
     let has_pairs = pairs::add_kept(&mut chart)?;
     let mut results = Results::read(&chart.study)?;
     let ended = if options.draw { Ok(()) } else { run(&mut chart, &mut results, options, has_pairs) };
@@ -58,15 +55,7 @@ pub fn carry_out(name: &str, options: &Options) -> Result<(), Failure> {
 fn run(chart: &mut Chart, results: &mut Results, options: &Options, has_pairs: bool) -> Result<(), Failure> {
     note_machine(chart)?;
     let before = results.clone();
-    // A setting that fails is a result; what else stops a batch stops the chart.
-    let goes_on = |ended: Result<(), Failure>| match ended {
-        Err(failure) if failure.code == exit::NUMERICAL => {
-            eprintln!("talus: {failure}");
-            Ok(())
-        }
-        other => other,
-    };
-    goes_on(batch::run(&chart.study, results, options))?;
+    batch::run(&chart.study, results, options)?;
     if has_pairs || options.evaluate || !pairs::choose(chart, results)? {
         return Ok(());
     }
@@ -75,7 +64,7 @@ fn run(chart: &mut Chart, results: &mut Results, options: &Options, has_pairs: b
     let spent: f64 = results.0.iter().filter(is_new).map(|(_, line)| cost(line)).sum();
     let budget = options.budget.map(|budget| budget.saturating_sub(Duration::from_secs_f64(spent)));
     let first = options.first.map(|_| 0);
-    goes_on(batch::run(&chart.study, results, &Options { budget, first, ..options.clone() }))
+    batch::run(&chart.study, results, &Options { budget, first, ..options.clone() })
 }
 
 /// The names of the processors that computed a chart, in `processor.txt` beside its results.

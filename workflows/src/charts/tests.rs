@@ -118,7 +118,7 @@ const SINGLE: [(&str, f64, f64); 7] = [
 
 #[test]
 fn every_run_of_every_chart_is_a_valid_scene() {
-    let names = definition::names().unwrap();
+    let names = definition::shelf().names().unwrap();
     for name in ["bagnold-film", "bars-bui", "cd-a05", "cd-a626", "k0-column", "lube-a1", "lube-a4"] {
         assert!(names.iter().any(|known| known == name), "{name}: {names:?}");
     }
@@ -161,7 +161,7 @@ fn every_run_of_every_chart_is_a_valid_scene() {
 #[test]
 fn options_of_another_material_are_marked() {
     let physical = ["young", "poisson", "friction", "cohesion", "dilatancy", "cone", "curve", "tension", "density"];
-    for name in definition::names().unwrap() {
+    for name in definition::shelf().names().unwrap() {
         let chart = Chart::named(&name).unwrap();
         for choice in &chart.choices {
             for option in &choice.options {
@@ -202,7 +202,7 @@ fn the_laws_in_the_charts_are_those_of_the_library() {
 fn the_page_has_markers_for_every_chart_and_no_others() {
     let text = std::fs::read_to_string(paths::charts_page()).unwrap();
     let mut wanted = Vec::new();
-    for name in definition::names().unwrap() {
+    for name in definition::shelf().names().unwrap() {
         if Chart::named(&name).unwrap().reduction.is_some() {
             wanted.push(format!("{name}/reduction"));
         }

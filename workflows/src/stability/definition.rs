@@ -2,7 +2,7 @@
 
 use crate::{
     failure::Failure,
-    paths,
+    paths, shelf,
     study::{
         cost,
         definition::{Named, Run, Study},
@@ -166,7 +166,7 @@ pub const KEYS: [&str; 48] = [
 impl Map {
     /// Reads the folder; every scene and expression in it is checked.
     pub fn read(folder: &Path) -> Result<Self, Failure> {
-        let methods: Methods = parsed(&folder.join(METHODS))?;
+        let methods: Methods = shelf::parsed(&folder.join(METHODS))?;
         let mut names = Vec::new();
         let entries = std::fs::read_dir(folder)
             .map_err(|e| Failure::no_input(format!("{}: cannot list it: {e}", paths::short(folder).display())))?;
@@ -180,8 +180,8 @@ impl Map {
         let (mut rows, mut runs, mut keys) = (Vec::new(), Vec::new(), Vec::new());
         for name in names {
             let path = folder.join(format!("{name}.toml"));
-            let fault = |e: String| Failure::no_input(format!("{}: {e}", paths::short(&path).display()));
-            let row = Row { name, ..parsed(&path)? };
+            let fault = |e: String| shelf::fault(&path, &e);
+            let row = Row { name, ..shelf::parsed(&path)? };
             row.check(&methods.method, &constants, &mut keys).map_err(fault)?;
             let is_of = |method: &&Method| row.runs_of.is_none() && row.methods.contains(&method.name);
             for method in methods.method.iter().filter(is_of) {
@@ -191,7 +191,7 @@ impl Map {
         }
         for row in &rows {
             let path = folder.join(format!("{}.toml", row.name));
-            let fault = |e: String| Failure::no_input(format!("{}: {e}", paths::short(&path).display()));
+            let fault = |e: String| shelf::fault(&path, &e);
             row.check_shared(&rows).map_err(fault)?;
         }
         let measures = keys.into_iter().map(Named::from).collect();
@@ -200,6 +200,7 @@ impl Map {
             folder: folder.to_owned(),
             words: "stability".into(),
             place: paths::study_runs("stability"),
+            may_break_down: true,
             title: "Where methods fail".into(),
             series: rows.iter().map(|row: &Row| row.name.clone()).collect(),
             parameters: vec![METHOD.into()],
@@ -236,12 +237,6 @@ impl Map {
         let is_of = |run: &&Run| run.series == row.series() && run.parameters[0].1 == Value::Text(method.into());
         self.study.runs.iter().find(is_of).filter(|_| row.methods.iter().any(|name| name == method))
     }
-}
-
-fn parsed<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, Failure> {
-    let fault = |e: String| Failure::no_input(format!("{}: {e}", paths::short(path).display()));
-    let text = std::fs::read_to_string(path).map_err(|e| fault(e.to_string()))?;
-    toml::from_str(&text).map_err(|e| fault(e.to_string()))
 }
 
 impl Row {

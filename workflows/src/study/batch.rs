@@ -22,8 +22,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use std::time::Instant;
 
-/// Runs what is to do. A run that fails leaves its exit code in the results, and the next one begins; a stop on request ends
-/// them all.
+/// Runs what is to do. A run that fails leaves its exit code in the results, and the next one begins; in the end they make a failure,
+/// unless breaking down is what is looked for. A stop on request ends them all.
 pub fn run(study: &Study, results: &mut Results, options: &Options) -> Result<(), Failure> {
     let sources = Sources::of_programs()?;
     let commit = short(&sources);
@@ -62,7 +62,7 @@ pub fn run(study: &Study, results: &mut Results, options: &Options) -> Result<()
                 exit::DONE => eprintln!("talus: [{}/{count}] {} done in {took}", number + 1, run.name),
                 exit::RESUMABLE => return Err(stopped(study)),
                 code => {
-                    *held(&failed) += 1;
+                    *held(&failed) += usize::from(!(study.may_break_down && code == exit::NUMERICAL));
                     let log = log(study, run);
                     let log = paths::short(&log).display();
                     eprintln!("talus: [{}/{count}] {} failed with exit code {code}: see {log}", number + 1, run.name);

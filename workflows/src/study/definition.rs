@@ -7,7 +7,11 @@ use super::{
     reference::{self, Reference},
     template::{self, Value, tidy},
 };
-use crate::{failure::Failure, paths};
+use crate::{
+    failure::Failure,
+    paths,
+    shelf::{self, Shelf},
+};
 use formats::scene::Scene;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -24,6 +28,8 @@ pub struct Study {
     pub words: String,
     /// Where its run folders lie.
     pub place: PathBuf,
+    /// Is a computation that breaks down (exit code 70) a result, and no failure?
+    pub may_break_down: bool,
     /// One line.
     pub title: String,
     /// Names of the series, in order.
@@ -221,16 +227,9 @@ struct Variant {
     set: Table,
 }
 
-/// Names of the folders with a study, sorted.
-pub fn names() -> Result<Vec<String>, Failure> {
-    let folder = paths::validation();
-    let entries = std::fs::read_dir(&folder)
-        .map_err(|e| Failure::no_input(format!("{}: cannot list the studies: {e}", folder.display())))?;
-    let has_study = |entry: &std::fs::DirEntry| entry.path().join("study.toml").is_file();
-    let mut names: Vec<String> =
-        entries.flatten().filter(has_study).map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    Ok(names)
+/// All studies.
+pub fn shelf() -> Shelf {
+    Shelf { folder: paths::validation(), file: "study.toml", kind: "study" }
 }
 
 impl Run {
@@ -260,19 +259,14 @@ impl Run {
 impl Study {
     /// Reads the study of a name.
     pub fn named(name: &str) -> Result<Self, Failure> {
-        let known = names()?;
-        match known.iter().any(|k| k == name) {
-            true => Self::read(name, &paths::validation().join(name)),
-            false => Err(Failure::usage(format!("there is no study `{name}`; there are: {}", known.join(", ")))),
-        }
+        Self::read(name, &shelf().find(name)?)
     }
 
     /// Reads the study in a folder; every scene and expression in it is checked.
     pub fn read(name: &str, folder: &Path) -> Result<Self, Failure> {
-        let path = folder.join("study.toml");
-        let fault = |e: String| Failure::no_input(format!("{}: {e}", paths::short(&path).display()));
-        let text = std::fs::read_to_string(&path).map_err(|e| fault(e.to_string()))?;
-        let raw: Raw = toml::from_str(&text).map_err(|e| fault(e.to_string()))?;
+        let path = folder.join(shelf().file);
+        let fault = |e: String| shelf::fault(&path, &e);
+        let raw: Raw = shelf::parsed(&path)?;
         let constants: Vec<(String, Value)> =
             raw.constants.iter().map(|(k, v)| Ok((k.clone(), value(v)?))).collect::<Result<_, _>>().map_err(fault)?;
         let mut study = Self {
@@ -280,6 +274,7 @@ impl Study {
             folder: folder.to_owned(),
             words: format!("study {name}"),
             place: paths::study_runs(name),
+            may_break_down: false,
             title: raw.title,
             series: raw.series.iter().map(|series| series.name.clone()).collect(),
             parameters: Vec::new(),
@@ -311,6 +306,13 @@ impl Study {
         study.references = reference::read(folder, raw.reference).map_err(fault)?;
         study.check().map_err(fault)?;
         Ok(study)
+    }
+
+    /// Are these series of it?
+    pub fn check_series(&self, names: &[String]) -> Result<(), Failure> {
+        let Some(unknown) = names.iter().find(|name| !self.series.contains(name)) else { return Ok(()) };
+        let (words, known) = (&self.words, self.series.join(", "));
+        Err(Failure::usage(format!("{words} has no series `{unknown}`; it has: {known}")))
     }
 
     /// The runs of a choice, in the order of the study.

@@ -53,7 +53,7 @@ pub struct Options {
 
 /// Prints the studies, and how much of each is done.
 pub fn list() -> Result<(), Failure> {
-    for name in definition::names()? {
+    for name in definition::shelf().names()? {
         let study = Study::named(&name)?;
         let results = Results::read(&study)?;
         println!("{name:<16} {}: {}", study.title, progress(&study, &results));
@@ -75,10 +75,7 @@ pub fn progress(study: &Study, results: &Results) -> String {
 /// Runs what is not there yet, then refreshes tables and pictures.
 pub fn carry_out(name: &str, options: &Options) -> Result<(), Failure> {
     let study = Study::named(name)?;
-    if let Some(unknown) = options.only.iter().find(|name| !study.series.contains(name)) {
-        let known = study.series.join(", ");
-        return Err(Failure::usage(format!("study {name} has no series `{unknown}`; it has: {known}")));
-    }
+    study.check_series(&options.only)?;
     let mut results = Results::read(&study)?;
     let ended = match options.draw {
         true => Ok(()),

@@ -14,7 +14,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 fn all() -> Vec<Study> {
-    definition::names().unwrap().iter().map(|name| Study::named(name).unwrap_or_else(|e| panic!("{e}"))).collect()
+    definition::shelf()
+        .names()
+        .unwrap()
+        .iter()
+        .map(|name| Study::named(name).unwrap_or_else(|e| panic!("{e}")))
+        .collect()
 }
 
 #[test]
