@@ -137,16 +137,16 @@ fn law() -> DruckerPrager {
     }
 }
 
-/// The defaults of the Drucker-Prager law.
+/// The defaults of dry sand.
 fn numerics() -> Numerics {
     Numerics {
         courant: 0.6,
         viscous_courant: 0.125,
-        viscosity: 0.1,
+        viscosity: 0.03,
         viscosity_on_approach: true,
         quadratic_viscosity: 0.0,
         damping: 0.0,
-        density_gate: 0.0,
+        density_gate: 0.98,
         density_diffusion: 0.0,
         stress_diffusion: 0.0,
         artificial_stress: 0.0,
@@ -186,7 +186,7 @@ fn the_least_scene_gets_all_defaults() {
             velocity: [0.0; 3],
         }],
         initial: Initial { stress: InitialStress::Zero, lattice: Lattice::Cubic, jitter: 0.0, seed: 1, relax: 0 },
-        numerics: Numerics { courant: 0.6, viscosity: 0.1, damping: 0.0, ..numerics() },
+        numerics: numerics(),
         end: End { time: 0.35, at_rest: None },
         output: Output { snapshots: 0.35 / 20.0, history: 0.35 / 400.0 },
     };
@@ -237,7 +237,8 @@ fn every_key_is_read() {
             seed: 7,
             relax: 0,
         },
-        numerics: Numerics { courant: 0.3, viscosity: 0.2, damping: 2.0, ..numerics() },
+        // Cohesive, and gaining volume: no gate.
+        numerics: Numerics { courant: 0.3, viscosity: 0.2, damping: 2.0, density_gate: 0.0, ..numerics() },
         end: End { time: 2.0, at_rest: Some(1e-4) },
         output: Output { snapshots: 0.02, history: 0.001 },
     };

@@ -134,6 +134,11 @@ impl ViscoPlastic {
 }
 
 impl DruckerPrager {
+    /// Is material below its density at the start in pieces? Not where it may be in tension, or gains volume by yielding.
+    pub fn comes_apart(&self) -> bool {
+        self.cohesion == 0.0 && self.dilation_deg == 0.0
+    }
+
     /// Bulk modulus K, Pa.
     pub fn bulk(&self) -> f64 {
         self.young / (3.0 * (1.0 - 2.0 * self.poisson))

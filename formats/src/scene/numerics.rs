@@ -99,22 +99,18 @@ pub(super) fn read(root: &Table<'_>, place: Place, material: Option<&Material>) 
     let most_diffused =
         [&density_diffusion, &stress_diffusion].into_iter().flatten().fold(0.0, |a: f64, b| a.max(b.value));
     let most_viscous = viscosity.as_ref().map_or(0.0, |found| found.value);
-    let step = default_courant(material?, limit).min(0.25 / most_diffused).min(0.6 / most_viscous);
-    // Yang et al. (2020): alpha = 0.1 on approach (Drucker-Prager), 0.01 always and delta = 0.1 (mu(I)); Szewc (2017): none.
-    let (alpha, approach, delta) = match material? {
-        Material::DruckerPrager(_) => (0.1, true, 0.0),
-        Material::MuI(_) => (0.01, false, 0.1),
-        Material::ViscoPlastic(_) => (0.0, false, 0.0),
-    };
+    let default = Defaults::of(material?);
+    let courant_free = if limit.is_infinite() { default.courant } else { default.courant.min(LIMITED_COURANT) };
+    let step = courant_free.min(0.8 * limit).min(0.25 / most_diffused).min(0.6 / most_viscous);
     Some(Numerics {
         courant: or(courant, step),
         viscous_courant: or(viscous_courant, 0.125),
-        viscosity: or(viscosity, alpha),
-        viscosity_on_approach: acts.map_or(approach, |found| found.value),
+        viscosity: or(viscosity, default.viscosity),
+        viscosity_on_approach: acts.map_or(default.on_approach, |found| found.value),
         quadratic_viscosity: or(quadratic_viscosity, 0.0),
         damping: or(damping, 0.0),
-        density_gate: or(density_gate, 0.0),
-        density_diffusion: or(density_diffusion, delta),
+        density_gate: or(density_gate, default.density_gate),
+        density_diffusion: or(density_diffusion, default.density_diffusion),
         stress_diffusion: or(stress_diffusion, 0.0),
         artificial_stress: or(artificial_stress, 0.0),
         gradient_correction: corrected,
@@ -123,17 +119,47 @@ pub(super) fn read(root: &Table<'_>, place: Place, material: Option<&Material>) 
     })
 }
 
-/// Courant number where the scene has none, before what diffuses; measured by the study `time-step` of VALIDATION.md.
-/// Columns of sand change from 1.9 on, falling blocks burst at 1.6; near the axis and with corrected gradients the limit
-/// is lower. Of the fluids, visco-plastic ones break at 1.4, a chute of mu(I) is 2 % slower at 1.0, and a cap that
-/// follows from the step falls with it.
-fn default_courant(material: &Material, limit: f64) -> f64 {
-    let free: f64 = match material {
-        Material::DruckerPrager(_) if limit.is_infinite() => 1.0,
-        _ => 0.6,
-    };
-    free.min(0.8 * limit)
+/// What a scene has where it says nothing, by its material.
+struct Defaults {
+    /// Before what diffuses, rings and corrected gradients, which limit it further; see the study `time-step` of VALIDATION.md.
+    courant: f64,
+    viscosity: f64,
+    on_approach: bool,
+    density_gate: f64,
+    density_diffusion: f64,
 }
+
+impl Defaults {
+    /// Sand that comes apart: what lies on or next to the front of the charts of error against cost. What holds together, or
+    /// gains volume, is in no chart, and blocks that bounce want viscosity and short steps: there, and for the fluids, the
+    /// viscosities of Yang et al. (2020) and Szewc (2017).
+    ///
+    /// Steps: columns of sand change from 1.9 on; blocks that do not yield, dropped at c/7, burst at 1.2 with a viscosity of
+    /// 0.03 and at 1.6 with 0.1. mu(I), elastic below yield, is as accurate at 1.0 as at 0.6. Of the fluids, visco-plastic
+    /// ones break at 1.4, a chute of mu(I) is 2 % slower at 1.0, and a cap that follows from the step falls with it.
+    fn of(material: &Material) -> Self {
+        match material {
+            Material::DruckerPrager(law) if law.comes_apart() => {
+                // The pressure that follows from the density has its gate in itself.
+                let density_gate = if material.ties_pressure_to_density() { 0.0 } else { 0.98 };
+                Self { courant: 1.4, viscosity: 0.03, on_approach: true, density_gate, density_diffusion: 0.0 }
+            }
+            Material::DruckerPrager(_) => {
+                Self { courant: 1.0, viscosity: 0.1, on_approach: true, density_gate: 0.0, density_diffusion: 0.0 }
+            }
+            Material::MuI(_) => {
+                let courant = if material.is_fluid() { 0.6 } else { 1.0 };
+                Self { courant, viscosity: 0.01, on_approach: false, density_gate: 0.0, density_diffusion: 0.1 }
+            }
+            Material::ViscoPlastic(_) => {
+                Self { courant: 0.6, viscosity: 0.0, on_approach: false, density_gate: 0.0, density_diffusion: 0.0 }
+            }
+        }
+    }
+}
+
+/// Default Courant number of rings and of corrected gradients, if 0.8 of their limit is not less.
+const LIMITED_COURANT: f64 = 0.6;
 
 /// Largest stable dt c/h of leap-frog with corrected gradients: measured on free blocks with random velocities, 1.09 (plane)
 /// and 1.00 (3-D) for the cubic spline at h = 1.2 dx, 1.02 and 0.94 for Wendland at 1.5625, down to 0.92 with particles
