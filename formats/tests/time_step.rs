@@ -41,7 +41,6 @@ fn the_default_depends_on_what_limits_the_step() {
     let soil = sand.replace("cohesion = 0", "cohesion = 100");
     let dense = format!("{sand}dilation = 5\n");
     let grains = "[material.mu-i]\nsound-speed = 10\nfriction-static = 0.4\n";
-    let solid = format!("{grains}unyielded = \"elastic\"\n");
     let mud =
         "[material.visco-plastic]\nsound-speed = 10\nfriction = 30\ncohesion = 0\nviscosity = 0\nviscosity-solid = 1\n";
     let default = |space: &str, law: &str, more: &str| {
@@ -54,7 +53,7 @@ fn the_default_depends_on_what_limits_the_step() {
     let with = |keys: &str| default("3d", sand, &format!("[numerics]\n{keys}\n"));
     for space in ["plane-strain", "3d"] {
         assert_eq!([sand, grains, mud].map(|law| default(space, law, "")), [1.4, 0.6, 0.6]);
-        assert_eq!([&soil, &dense, &solid].map(|law| default(space, law, "")), [1.0; 3]);
+        assert_eq!([&soil, &dense].map(|law| default(space, law, "")), [1.0; 2]);
     }
     assert_eq!(default("axisymmetric", sand, ""), 0.6);
     let wide = default("axisymmetric", sand, "[kernel]\nkind = \"wendland-c2\"\n");

@@ -25,7 +25,7 @@ fn slide(walls: &str) -> String {
 fn k3_a_box_is_as_good_as_a_plane_wall() {
     let work = WorkFolder::new();
     solids::block(&work, "box.stl", [0.1875, -1.0, -1.0], [1.0, 2.0, 2.0]);
-    for (slip, tolerance) in [("no-slip", 0.0), ("free-slip", 0.005)] {
+    for (slip, tolerance) in [("no-slip", 0.0), ("free-slip", 0.011)] {
         let floor = wall("floor", "z", 0.0, "above", "no-slip");
         let plane = computed(
             &work,
@@ -40,7 +40,7 @@ fn k3_a_box_is_as_good_as_a_plane_wall() {
         let off = plane.position.iter().zip(&solid.position).map(|(a, b)| apart(*a, *b)).fold(0.0, f64::max);
         let moved = plane.position.iter().map(|x| x[1] - 0.125).fold(0.0, f64::max);
         println!("{slip}: particles are up to {off:.2e} m apart, and have gone up to {moved:.3} m");
-        // Measured 0 and 3.9e-3 m, a quarter of a spacing.
+        // Measured 0 and 8.1e-3 m, half a spacing (3.9e-3 m with a viscosity of 0.1, no gate and steps of 1.0).
         assert!(off <= tolerance && moved > 0.02, "{slip}: {off} m");
     }
 }

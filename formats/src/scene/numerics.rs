@@ -135,8 +135,8 @@ impl Defaults {
     /// viscosities of Yang et al. (2020) and Szewc (2017).
     ///
     /// Steps: columns of sand change from 1.9 on; blocks that do not yield, dropped at c/7, burst at 1.2 with a viscosity of
-    /// 0.03 and at 1.6 with 0.1. mu(I), elastic below yield, is as accurate at 1.0 as at 0.6. Of the fluids, visco-plastic
-    /// ones break at 1.4, a chute of mu(I) is 2 % slower at 1.0, and a cap that follows from the step falls with it.
+    /// 0.03 and at 1.6 with 0.1. Visco-plastic fluids break at 1.4. A chute of mu(I) is 2 to 3 % slower at 1.0, and a cap
+    /// that follows from the step falls with it.
     fn of(material: &Material) -> Self {
         match material {
             Material::DruckerPrager(law) if law.comes_apart() => {
@@ -148,8 +148,7 @@ impl Defaults {
                 Self { courant: 1.0, viscosity: 0.1, on_approach: true, density_gate: 0.0, density_diffusion: 0.0 }
             }
             Material::MuI(_) => {
-                let courant = if material.is_fluid() { 0.6 } else { 1.0 };
-                Self { courant, viscosity: 0.01, on_approach: false, density_gate: 0.0, density_diffusion: 0.1 }
+                Self { courant: 0.6, viscosity: 0.01, on_approach: false, density_gate: 0.0, density_diffusion: 0.1 }
             }
             Material::ViscoPlastic(_) => {
                 Self { courant: 0.6, viscosity: 0.0, on_approach: false, density_gate: 0.0, density_diffusion: 0.0 }

@@ -39,6 +39,8 @@ pub struct Chart {
     pub pairs: Pairs,
     /// Which runs tell what a reduced model costs.
     pub reduction: Option<Reduction>,
+    /// Charts whose settings are compared with the default together.
+    pub group: Option<String>,
     /// Names and texts of the templates, in order.
     scene: Vec<(String, String)>,
     /// Laid over the template in every run.
@@ -135,6 +137,7 @@ pub struct Reduction {
 #[serde(deny_unknown_fields)]
 struct Raw {
     title: String,
+    group: Option<String>,
     measures: Vec<Named>,
     #[serde(default)]
     also: Vec<Named>,
@@ -230,6 +233,7 @@ impl Chart {
             choices: raw.choices,
             pairs: raw.pairs,
             reduction: raw.reduction,
+            group: raw.group,
             scene: raw.scene.iter().map(template).collect::<Result<_, _>>()?,
             set: raw.set,
         };

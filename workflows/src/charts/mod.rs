@@ -9,6 +9,7 @@ mod pairs;
 mod picture;
 mod points;
 mod reduction;
+mod singles;
 #[cfg(test)]
 mod tests;
 

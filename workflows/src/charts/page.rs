@@ -5,7 +5,7 @@ use super::{
     front::Rank,
     netcdf, picture,
     points::{Point, Points},
-    reduction,
+    reduction, singles,
 };
 use crate::{
     failure::Failure,
@@ -39,6 +39,9 @@ pub fn refresh(chart: &Chart, results: &Results, points: &Points) -> Result<Vec<
     if chart.reduction.is_some() {
         let name = format!("{}/reduction", chart.study.name);
         text = replaced(&text, &name, &reduction::table(chart, results)).map_err(fault)?;
+    }
+    if let Some(group) = &chart.group {
+        text = replaced(&text, group, &singles::table(group)?).map_err(fault)?;
     }
     disk::write_atomic(&page, text.as_bytes())
         .map_err(|e| Failure::cannot_write(format!("{}: {e}", paths::short(&page).display())))?;

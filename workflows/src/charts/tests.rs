@@ -3,7 +3,7 @@
 use super::{
     definition::{self, BASE, Chart, PAIRS},
     front::Rank,
-    netcdf, page, pairs, picture, points,
+    netcdf, page, pairs, picture, points, singles,
 };
 use crate::{
     paths,
@@ -203,14 +203,17 @@ fn the_page_has_markers_for_every_chart_and_no_others() {
     let text = std::fs::read_to_string(paths::charts_page()).unwrap();
     let mut wanted = Vec::new();
     for name in definition::shelf().names().unwrap() {
-        if Chart::named(&name).unwrap().reduction.is_some() {
+        let chart = Chart::named(&name).unwrap();
+        if chart.reduction.is_some() {
             wanted.push(format!("{name}/reduction"));
         }
         wanted.push(name);
+        wanted.extend(chart.group);
     }
     let mut found: Vec<String> = markers(&text).into_iter().map(str::to_owned).collect();
     found.sort();
     wanted.sort();
+    wanted.dedup();
     assert_eq!(found, wanted);
 }
 
@@ -420,4 +423,32 @@ fn other_programs_find_the_points_in_a_file() {
     assert!(picture::png(&chart, &points).unwrap().len() > 1000);
     let one = points::of(&chart, &with(&chart, &SINGLE[..1]));
     assert!(picture::png(&chart, &one).unwrap().len() > 1000);
+}
+
+#[test]
+fn single_settings_are_compared_with_the_default_over_charts() {
+    let work = tempfile::tempdir().unwrap();
+    let charts: Vec<_> = [("step-short", 2.05), ("step-short", 2.4)]
+        .map(|changed| {
+            let chart = with_materials(work.path());
+            let single =
+                SINGLE.map(|(name, runout, cost)| (name, if name == changed.0 { changed.1 } else { runout }, cost));
+            let points = points::of(&chart, &with(&chart, &single));
+            (chart, points)
+        })
+        .into();
+    let rows = singles::rows(&charts);
+    // Of another material: fluid, soft.
+    assert_eq!(rows.iter().map(|row| row.setting.as_str()).collect::<Vec<_>>(), ["wendland", "wide", "short"]);
+    // 2.5 % and 20 % in place of 10 %: their geometric mean is as good as the default, in four times its time.
+    let short = &rows[2];
+    assert!((short.error - 0.5_f64.sqrt()).abs() < 1e-9 && (short.cost - 4.0).abs() < 1e-9, "{short:?}");
+    assert_eq!((short.better, short.worse, short.of, short.broken), (1, 1, 2, 0));
+    assert!((rows[1].error - 0.5).abs() < 1e-9 && rows[1].better == 2, "{:?}", rows[1]);
+    // One that broke down counts as that, and a chart without it does not count.
+    let mut results = with(&charts[0].0, &SINGLE);
+    results.0.get_mut("kernel-wide-resolution-10-seed-2").unwrap().exit = 70;
+    let points = points::of(&charts[0].0, &results);
+    let broken = singles::rows(&[(with_materials(work.path()), points)]);
+    assert_eq!((broken[1].of, broken[1].broken), (0, 1));
 }
