@@ -7,7 +7,7 @@ use crate::{
     summary::{self, short, size},
 };
 use formats::{
-    scene::{Body, InitialStress, Material, Obstacle, Scene, Shape, Slip, Unyielded, Wall, WallKind},
+    scene::{Body, InitialStress, Material, Numerics, Obstacle, Scene, Shape, Slip, Unyielded, Wall, WallKind},
     space::Space,
 };
 use std::path::PathBuf;
@@ -198,12 +198,29 @@ fn how(scene: &Scene, lattices: &[Lattice]) -> Vec<String> {
             short(scene.material.sound_speed()),
             short(scene.numerics.courant)
         ),
+        dissipation(&scene.numerics),
         format!(
             "That makes {} particle-steps and takes about {} of memory on one rank.",
             short(load.particles as f64 * steps as f64),
             size(load.bytes(1))
         ),
     ]
+}
+
+/// What the results depend on beside the law: said whether the scene names it or not.
+fn dissipation(numerics: &Numerics) -> String {
+    let pairs = if numerics.viscosity_on_approach { "particles that approach each other" } else { "all particles" };
+    let viscosity = match numerics.viscosity {
+        0.0 => "No artificial viscosity acts".into(),
+        alpha => format!("An artificial viscosity of {} acts between {pairs}", short(alpha)),
+    };
+    match numerics.density_gate {
+        0.0 => viscosity + ".",
+        gate => format!(
+            "{viscosity}; what is below {} of its density has come apart, and carries nothing until it is closed again.",
+            short(gate)
+        ),
+    }
 }
 
 fn out(scene: &Scene) -> Vec<String> {
@@ -337,6 +354,7 @@ time = "0.4 s"
             "a metre of depth",
             "no critical state",
             "True stiffness",
+            "An artificial viscosity of 0.03 acts between particles that approach each other; what is below 0.98 of its density has",
         ] {
             assert!(flat.contains(words), "{words} in\n{plane}");
         }
@@ -360,5 +378,6 @@ time = "0.4 s"
         let told = with(mu).split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(told.contains("mu(I) law") && told.contains("from 0.38 at rest to 0.64"), "{told}");
         assert!(told.contains("goes on creeping"), "{told}");
+        assert!(told.contains("viscosity of 0.01 acts between all particles."), "{told}");
     }
 }

@@ -29,7 +29,7 @@ pub struct Point {
     pub resolution: f64,
     /// Lattices.
     pub count: usize,
-    /// Mean processor time, s, and its standard deviation.
+    /// Processor time, s, of the mean lattice on a machine that does nothing else, and its standard deviation.
     pub cost: [f64; 2],
     /// Mean error, and its standard deviation.
     pub error: [f64; 2],
@@ -130,7 +130,8 @@ pub fn of(chart: &Chart, results: &Results) -> Points {
             points.failed.push(format!("{name}, {resolution} ({bad} of {})", lines.len()));
             continue;
         }
-        let cost = mean_and_deviation(&costs);
+        let steps = of(numbers::PARTICLE_STEPS);
+        let cost = quiet_cost(&costs, &steps);
         let is_other = chart.is_other_material(&name);
         points.done.push(Point {
             setting: name,
@@ -140,7 +141,7 @@ pub fn of(chart: &Chart, results: &Results) -> Points {
             cost: [cost[0], cost[1].max(COST_SCATTER * cost[0])],
             error: mean_and_deviation(&errors),
             also: chart.also.iter().map(|column| mean_and_deviation(&of(&column.expression))[0]).collect(),
-            particle_steps: mean_and_deviation(&of(numbers::PARTICLE_STEPS))[0],
+            particle_steps: mean_and_deviation(&steps)[0],
             particles: lines.iter().filter_map(|(_, line)| line.particles).max().unwrap_or(0),
             rank: (!is_other).then_some(Rank::Behind),
             of_all: Rank::Behind,
@@ -194,6 +195,12 @@ fn setting(run: &Run) -> (String, f64) {
     (text.unwrap_or_else(|| BASE.into()), template::number(&run.parameters, "resolution").unwrap_or(f64::NAN))
 }
 
+/// What else a machine does only adds to the time of a particle-step, so the least one of the lattices counts for all of them.
+fn quiet_cost(costs: &[f64], steps: &[f64]) -> [f64; 2] {
+    let least = costs.iter().zip(steps).map(|(cost, steps)| cost / steps).fold(f64::INFINITY, f64::min);
+    mean_and_deviation(steps).map(|steps| steps * least)
+}
+
 fn mean_and_deviation(values: &[f64]) -> [f64; 2] {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -231,5 +238,12 @@ mod tests {
         assert_eq!(points.map(|p| p.error[1]), [0.2, 0.02, 0.04, 0.08]);
         assert_eq!(mean_and_deviation(&[1.0, 3.0]), [2.0, 2.0_f64.sqrt()]);
         assert_eq!(mean_and_deviation(&[1.0]), [1.0, 0.0]);
+    }
+
+    #[test]
+    fn the_time_of_a_busy_machine_does_not_count() {
+        // The second lattice took as many steps, and twice the time.
+        assert_eq!(quiet_cost(&[1.0, 2.0], &[10.0, 10.0]), [1.0, 0.0]);
+        assert_eq!(quiet_cost(&[1.0, 4.0], &[10.0, 20.0]), [1.5, 5.0 * 2.0_f64.sqrt() / 10.0]);
     }
 }
