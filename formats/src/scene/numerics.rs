@@ -134,8 +134,8 @@ impl Defaults {
     /// gains volume, is in no chart, and blocks that bounce want viscosity and short steps: there, and for the fluids, the
     /// viscosities of Yang et al. (2020) and Szewc (2017).
     ///
-    /// Steps: columns of sand change from 1.9 on; blocks that do not yield, dropped at c/7, burst at 1.2 with a viscosity of
-    /// 0.03 and at 1.6 with 0.1. Visco-plastic fluids break at 1.4. A chute of mu(I) is 2 to 3 % slower at 1.0, and a cap
+    /// Steps: columns of sand change from 1.9 on; blocks that do not yield, dropped at c/7, burst at 1.0 with a viscosity of
+    /// 0.03 and at 1.2 with 0.1. Visco-plastic fluids break at 1.4. A chute of mu(I) is 2 to 3 % slower at 1.0, and a cap
     /// that follows from the step falls with it.
     fn of(material: &Material) -> Self {
         match material {
