@@ -186,7 +186,8 @@ fn a_bit_in_any_dataset_or_attribute() {
         flip(&state, byte, number as u32).unwrap();
     }
     let manifest = folder.generation(3).join("MANIFEST.json");
-    let said = |manifest: &Path| serde_json::from_slice::<serde_json::Value>(&fs::read(manifest).unwrap()).ok();
+    let said =
+        |manifest: &std::path::Path| serde_json::from_slice::<serde_json::Value>(&fs::read(manifest).unwrap()).ok();
     let original = said(&manifest);
     for byte in (0..fs::metadata(&manifest).unwrap().len() - 1).step_by(5) {
         flip(&manifest, byte, byte as u32 / 5).unwrap();
