@@ -92,12 +92,14 @@ fn long_rest() {
     }
 }
 
-/// A column beside a smooth wall, let go on a rough floor; the corner lies at `x`, `z`.
+/// A column beside a smooth wall, let go on a rough floor; the corner lies at `x`, `z`. Not with the defaults of dry sand: whether
+/// a particle is below the gate can hang on a last digit, and with little viscosity that is felt around it (4 % of a spacing on
+/// average, 0.04 dx of the front).
 fn collapse(x: f64, z: f64) -> String {
     format!(
         "space = \"plane-strain\"\nspacing = 0.005\n{LAW}\
          [body.column]\nbox = {{ min = [{x}, 0, {z}], max = [{}, 0, {}] }}\n{}{}\
-         [numerics]\n[end]\ntime = 0.35\n[output]\nsnapshots = 0.35\nhistory = 0.005\n",
+         [numerics]\nviscosity = 0.1\ndensity-gate = 0\ncourant = 1\n[end]\ntime = 0.35\n[output]\nsnapshots = 0.35\nhistory = 0.005\n",
         x + 0.1,
         z + 0.1,
         wall("floor", "z", z, "above", "no-slip"),
