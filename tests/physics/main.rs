@@ -17,6 +17,10 @@ mod walls;
 use formats::folder::RunFolder;
 use formats::snapshot::{self, Header, Rows};
 
+/// Viscosity and density as Yang et al. (2020) have them, with the steps of material that does not come apart: for what is held against
+/// numbers that the little viscosity and the gate of dry sand blur.
+const AS_YANG: &str = "viscosity = 0.1\ndensity-gate = 0\ncourant = 1";
+
 /// A scene of one body; the standard material is that of Yang et al. 2020, Table 1.
 #[derive(Clone, Debug)]
 struct Scene {

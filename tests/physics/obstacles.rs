@@ -1,12 +1,12 @@
 //! Obstacles from STL files: as good as plane walls, and the forces on them.
 
-use crate::{Scene, history, last, wall};
+use crate::{AS_YANG, Scene, history, last, wall};
 use tests::{WorkFolder, computed, solids};
 
 const SPACING: f64 = 0.015625;
 
 /// A block that falls and slides against a wall at x = 12 spacings.
-fn slide(walls: &str) -> String {
+fn slide(walls: &str, numerics: &'static str) -> String {
     let scene = Scene {
         space: "3d",
         spacing: SPACING,
@@ -14,6 +14,7 @@ fn slide(walls: &str) -> String {
         walls: walls.to_string(),
         end: 0.15,
         young: 0.5e6,
+        numerics,
         ..Scene::default()
     };
     scene.text()
@@ -25,22 +26,23 @@ fn slide(walls: &str) -> String {
 fn k3_a_box_is_as_good_as_a_plane_wall() {
     let work = WorkFolder::new();
     solids::block(&work, "box.stl", [0.1875, -1.0, -1.0], [1.0, 2.0, 2.0]);
-    for (slip, tolerance) in [("no-slip", 0.0), ("free-slip", 0.011)] {
+    // Measured 0; 3.9e-3 m, a quarter of a spacing, as Yang et al. have it, and 8.1e-3 m with the defaults of sand.
+    let cases = [("no-slip", "", 0.0), ("free-slip", AS_YANG, 0.005), ("free-slip", "", 0.01)];
+    for (k, (slip, numerics, tolerance)) in cases.into_iter().enumerate() {
         let floor = wall("floor", "z", 0.0, "above", "no-slip");
         let plane = computed(
             &work,
-            &format!("plane-{slip}"),
-            &slide(&(floor.clone() + &wall("side", "x", 0.1875, "below", slip))),
+            &format!("plane-{k}"),
+            &slide(&(floor.clone() + &wall("side", "x", 0.1875, "below", slip)), numerics),
             0,
         );
         let solid = format!("{floor}[obstacle.box]\nfile = \"box.stl\"\nslip = \"{slip}\"\n");
-        let solid = computed(&work, &format!("solid-{slip}"), &slide(&solid), 0);
+        let solid = computed(&work, &format!("solid-{k}"), &slide(&solid, numerics), 0);
         let (plane, solid) = (last(&plane).1, last(&solid).1);
         let apart = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max);
         let off = plane.position.iter().zip(&solid.position).map(|(a, b)| apart(*a, *b)).fold(0.0, f64::max);
         let moved = plane.position.iter().map(|x| x[1] - 0.125).fold(0.0, f64::max);
-        println!("{slip}: particles are up to {off:.2e} m apart, and have gone up to {moved:.3} m");
-        // Measured 0 and 8.1e-3 m, half a spacing (3.9e-3 m with a viscosity of 0.1, no gate and steps of 1.0).
+        println!("{slip} {numerics:?}: particles are up to {off:.2e} m apart, and have gone up to {moved:.3} m");
         assert!(off <= tolerance && moved > 0.02, "{slip}: {off} m");
     }
 }

@@ -5,7 +5,7 @@
 //! far away, of two), and two to four orders below a spacing, or below what a change of the Courant number does: what f32
 //! adds is not to be seen.
 
-use crate::{history, last, wall};
+use crate::{AS_YANG, history, last, wall};
 use formats::folder::RunFolder;
 use tests::{WorkFolder, computed};
 
@@ -99,7 +99,7 @@ fn collapse(x: f64, z: f64) -> String {
     format!(
         "space = \"plane-strain\"\nspacing = 0.005\n{LAW}\
          [body.column]\nbox = {{ min = [{x}, 0, {z}], max = [{}, 0, {}] }}\n{}{}\
-         [numerics]\nviscosity = 0.1\ndensity-gate = 0\ncourant = 1\n[end]\ntime = 0.35\n[output]\nsnapshots = 0.35\nhistory = 0.005\n",
+         [numerics]\n{AS_YANG}\n[end]\ntime = 0.35\n[output]\nsnapshots = 0.35\nhistory = 0.005\n",
         x + 0.1,
         z + 0.1,
         wall("floor", "z", z, "above", "no-slip"),
