@@ -47,7 +47,7 @@ fn g5_energies_add_up() {
         // Half as many: measured 2.1e-3 and 3.3e-3.
         ("no-slip", "virtual", AS_YANG, 0.01, 3e-3),
         ("no-slip", "virtual", "", 0.01, 5e-3),
-        // Measured 8.6e-5; with a scene's defaults 4.2e-4, for it goes as the step; 3.6e-4 and 6.8e-5.
+        // Measured 1.4e-4; with a scene's defaults 4.2e-4, for it goes as the step; 5.9e-4 and 6.8e-5.
         ("free-slip", "mirror", AS_YANG, 0.01, 2e-4),
         ("free-slip", "mirror", "", 0.01, 8e-4),
         ("free-slip", "mirror", "viscosity = 0\ndensity-gate = 0\ncourant = 1", 0.01, 7e-4),

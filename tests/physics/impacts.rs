@@ -53,7 +53,7 @@ fn blocks_that_fall_on_floors() {
         let [plain, damped] = ["", "quadratic-viscosity = 1"].map(|numerics| impact("virtual", speed, numerics));
         let mirror = impact("mirror", speed, AS_YANG);
         let soft = impact("mirror", speed, "");
-        // Measured 0.42 and 0.29 dx above virtual particles, 0.21 and 0.00 dx above a mirror, which also puts back what would
+        // Measured 0.42 and 0.29 dx above virtual particles, 0.24 and 0.00 dx above a mirror, which also puts back what would
         // cross it: with the little viscosity of sand at both speeds.
         for (found, lowest) in [(&plain, on_virtual), (&mirror, on_mirror), (&soft, -1e-6)] {
             assert!(found.behind == 0.0 && found.lowest > lowest, "{speed} m/s: {found:?}");
